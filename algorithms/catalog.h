@@ -1,0 +1,33 @@
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "algorithms/method_info.h"
+#include "algorithms/progress.h"
+#include "algorithms/volume/volume.h"
+
+namespace volsmooth {
+
+/// One row of the catalogue: what is declared outside, and what runs.
+struct Method {
+  MethodInfo info;
+
+  /// Resolves parameters that were checked against `info.parameters` into all that `run` will do: defaults
+  /// filled in from the grid, `flow_time_mm2`, `feature_radius_mm`, `step_mm2`, `steps`.
+  std::function<ParameterValues(const ParameterValues& asked, const Grid& grid)> resolve;
+
+  /// Transforms `volume` in place; takes what `resolve` gave. Empty for a method that is made of `parts`.
+  std::function<void(Volume& volume, const ParameterValues& resolved, const Progress& report)> run;
+
+  /// Bytes held at the peak of `run` beyond the volume itself, per voxel.
+  double extra_bytes_per_voxel = 0;
+};
+
+/// Every method that is offered, in the order of `GET /v1/methods`.
+const std::vector<Method>& catalog();
+
+/// The row called `name`, or null.
+const Method* find_method(std::string_view name);
+
+}  // namespace volsmooth

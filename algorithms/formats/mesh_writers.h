@@ -1,0 +1,32 @@
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "algorithms/progress.h"
+#include "algorithms/surface/mesh.h"
+
+namespace volsmooth {
+
+/// Writes one mesh to one file. Throws std::system_error when the file cannot be written.
+using MeshWriter = void (*)(const std::filesystem::path& file, std::span<const Mesh> meshes,
+                            const Progress& report);
+
+/// One row of the format table.
+struct MeshFormat {
+  std::string name;        ///< "stl": also the file's extension
+  std::string media_type;  ///< "model/stl"
+  std::string description;
+  bool many_surfaces;  ///< one file holds all isovalues of a method, a named node each (GLB)
+  MeshWriter write;    ///< takes exactly one mesh unless `many_surfaces`
+};
+
+const std::vector<MeshFormat>& mesh_formats();
+const MeshFormat* find_mesh_format(std::string_view name);
+
+/// The shortest text that reads back as `isovalue`, as in file and node names: "300", "-300", "0.5".
+std::string isovalue_text(double isovalue);
+
+}  // namespace volsmooth

@@ -1,0 +1,57 @@
+#include "algorithms/volume/volume.h"
+
+#include <algorithm>
+
+namespace volsmooth {
+
+Volume::Pointer make_volume(const Size3& size, const VoxelToWorld& map) {
+  const VoxelToWorld lps = in_frame(map, Frame::kLps);
+  const Vector3 spacing = spacing_of(map);
+  auto volume = Volume::New();
+  Volume::SizeType itk_size;
+  Volume::DirectionType direction;
+  for (unsigned axis = 0; axis < 3; ++axis) {
+    itk_size[axis] = static_cast<itk::SizeValueType>(size[axis]);
+    for (unsigned row = 0; row < 3; ++row) direction(row, axis) = lps.linear[row][axis] / spacing[axis];
+  }
+  volume->SetRegions(itk_size);
+  volume->SetSpacing(spacing.data());
+  volume->SetOrigin(lps.origin.data());
+  volume->SetDirection(direction);
+  volume->Allocate();
+  return volume;
+}
+
+Volume::Pointer make_volume(const Grid& grid) {
+  VoxelToWorld map{.frame = Frame::kLps};
+  for (std::size_t axis = 0; axis < 3; ++axis) map.linear[axis][axis] = grid.spacing_mm[axis];
+  return make_volume(grid.size, map);
+}
+
+Grid grid_of(const Volume& volume) {
+  Grid grid;
+  for (unsigned axis = 0; axis < 3; ++axis) {
+    grid.size[axis] = static_cast<std::int64_t>(volume.GetBufferedRegion().GetSize(axis));
+    grid.spacing_mm[axis] = volume.GetSpacing()[axis];
+  }
+  return grid;
+}
+
+std::span<float> voxels_of(Volume& volume) {
+  return {volume.GetBufferPointer(), volume.GetBufferedRegion().GetNumberOfPixels()};
+}
+
+std::span<const float> voxels_of(const Volume& volume) {
+  return {volume.GetBufferPointer(), volume.GetBufferedRegion().GetNumberOfPixels()};
+}
+
+Volume::Pointer copy_of(const Volume& volume) {
+  auto copy = Volume::New();
+  copy->CopyInformation(&volume);
+  copy->SetRegions(volume.GetBufferedRegion());
+  copy->Allocate();
+  std::ranges::copy(voxels_of(volume), copy->GetBufferPointer());
+  return copy;
+}
+
+}  // namespace volsmooth

@@ -1,0 +1,150 @@
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <tl/expected.hpp>
+#include <vector>
+
+#include "algorithms/method_info.h"
+#include "algorithms/progress.h"
+#include "service/jobs/problem.h"
+
+namespace volsmooth {
+
+using Time = std::chrono::system_clock::time_point;
+
+/// How an upload is to be read; kept with the volume.
+struct UploadOptions {
+  std::optional<std::int64_t> volume_index;
+  std::optional<double> non_finite;
+  std::string series;    ///< DICOM series UID; not offered yet
+  std::string resample;  ///< "uniform"; not offered yet
+};
+
+/// What verification found in an uploaded file: the volume document without what storing adds.
+struct VolumeFacts {
+  std::string format;
+  std::array<std::int64_t, 3> size{};
+  std::array<double, 3> spacing_mm{};
+  std::array<std::array<double, 4>, 4> affine{};  ///< voxel index -> mm in `frame`
+  std::string frame;                              ///< "RAS" or "LPS"
+  std::string voxel_type;
+  double intensity_min = 0;
+  double intensity_max = 0;
+  std::vector<std::string> warnings;
+};
+
+/// A verified, durable upload. Immutable.
+struct StoredVolume {
+  std::string id;
+  UploadOptions options;
+  VolumeFacts facts;
+  std::int64_t bytes = 0;
+  std::string sha256;  ///< of the bytes as uploaded, hex
+  Time created_at;
+};
+
+/// What a client asks for; `volume` aside, every member has a default.
+struct JobOrder {
+  std::string volume;
+  std::string method = "mean-curvature-flow";
+  ParameterValues parameters;                    ///< as asked; see Job::parameters for the resolved ones
+  std::optional<std::vector<double>> isovalues;  ///< none: "auto"
+  std::vector<std::string> mesh_formats = {"stl"};
+  std::string mesh_frame;           ///< "RAS", "LPS", or empty: the volume's own
+  std::string voxel_type = "same";  ///< or "float32"
+  std::vector<std::string> outputs = {"nifti"};
+  std::string label;
+};
+
+/// What a job will take, known before it is accepted.
+struct JobPlan {
+  ParameterValues parameters;     ///< resolved: flow_time_mm2, step_mm2, steps, ...
+  std::int64_t memory_bytes = 0;  ///< at the peak
+};
+
+/// One file that a job made.
+struct Result {
+  std::string name;  ///< such as "mean-curvature-flow_iso300.stl"
+  std::string kind;  ///< "volume", "surface", "report" or "picture"
+  std::string method;
+  std::vector<double> isovalues;  ///< of a surface: one, or all of a file with many surfaces
+  bool many_surfaces = false;     ///< tells a list of one isovalue from a number
+  std::string frame;              ///< of a volume or surface, else empty
+  std::string media_type;
+  std::int64_t bytes = 0;
+  std::string sha256;
+};
+
+enum class JobState { kQueued, kRunning, kSucceeded, kFailed, kCancelled };
+
+std::string_view name_of(JobState state);
+std::optional<JobState> job_state_from(std::string_view name);
+bool is_final(JobState state);
+
+/// The life of a job, whole: queued -> running -> one of the final states; a running job goes back to queued
+/// when the daemon stops or dies under it; a final one never changes.
+bool can_become(JobState from, JobState to);
+
+struct JobProgress {
+  std::string stage;  ///< "queued", "read", "flow", "surfaces", "write", "done"
+  double fraction = 0;
+  std::optional<double> eta_seconds;
+};
+
+struct Job {
+  std::string id;
+  JobState state = JobState::kQueued;
+  JobOrder order;
+  ParameterValues parameters;  ///< resolved
+  std::int64_t memory_bytes = 0;
+  JobProgress progress;
+  Time created_at;
+  std::optional<Time> started_at;
+  std::optional<Time> finished_at;
+  std::optional<Problem> error;
+  std::vector<Result> results;
+  int attempt = 0;  ///< how often it was claimed: the fence that a result must carry
+};
+
+/// Told how far a job is. Thread-safe; throws `Cancelled` to end it.
+using StageProgress = std::function<void(std::string_view stage, double fraction)>;
+
+/// All that the computing side needs of one job.
+struct ComputeTask {
+  std::filesystem::path volume_file;
+  StoredVolume volume;
+  JobOrder order;
+  ParameterValues parameters;        ///< resolved
+  std::filesystem::path output_dir;  ///< exists and is empty; results are written into it by their names
+  int threads = 0;                   ///< 0: all cores
+};
+
+/// The computing side, handed to the service by main as plain functions (pipeline/pipeline.h makes them). A
+/// problem is the input's or the order's fault; anything thrown but `Cancelled` is ours.
+struct Engine {
+  std::vector<MethodInfo> methods;
+  struct Format {
+    std::string name, media_type, description;
+  };
+  std::vector<Format> mesh_formats;
+
+  /// Verifies an uploaded file completely.
+  std::function<tl::expected<VolumeFacts, Problem>(const std::filesystem::path& file,
+                                                   const UploadOptions& options)>
+      inspect;
+  /// Checks an order against its volume and resolves its parameters; cheap.
+  std::function<tl::expected<JobPlan, Problem>(const JobOrder& order, const VolumeFacts& volume)> plan;
+  /// Runs it. Result files are complete but not yet synced when it returns.
+  std::function<tl::expected<std::vector<Result>, Problem>(const ComputeTask& task,
+                                                           const StageProgress& report)>
+      compute;
+};
+
+}  // namespace volsmooth

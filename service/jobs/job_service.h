@@ -1,0 +1,108 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <tl/expected.hpp>
+#include <vector>
+
+#include "service/jobs/job.h"
+#include "service/storage/incoming_file.h"
+
+namespace volsmooth {
+
+struct JobServiceSettings {
+  std::filesystem::path data_dir;       ///< locked for this process; created when missing
+  int workers = 2;                      ///< jobs that run at the same time
+  int threads = 0;                      ///< compute threads of a job; 0: all cores
+  std::int64_t memory_limit_bytes = 0;  ///< running jobs together; 0: 80 % of the machine's
+  std::int64_t max_upload_bytes = std::int64_t{16} << 30;
+  int max_deaths = 10;  ///< a job that was running at this many deaths of the daemon is failed
+  int max_queued = 10'000;
+};
+
+struct JobQuery {
+  std::optional<JobState> state;
+  std::string method;  ///< empty: any
+  std::string label;   ///< empty: any
+  int limit = 50;
+  std::string cursor;  ///< as given by the page before; empty: from the newest
+};
+
+struct JobPage {
+  std::vector<Job> jobs;    ///< newest first
+  std::string next_cursor;  ///< empty: this was the last page
+};
+
+struct JobEvent {
+  std::string id;  ///< opaque; later events of the same job compare later, also across restarts of the daemon
+  std::string kind;  ///< "state" or "progress"
+  std::string data;  ///< JSON, one line
+};
+
+struct StoredFile {
+  std::filesystem::path path;
+  std::string media_type;
+  std::int64_t bytes = 0;
+  std::string sha256;
+};
+
+struct ServiceStatistics {
+  std::int64_t queued = 0, running = 0, volumes = 0, jobs_total = 0, stored_bytes = 0, free_disk_bytes = 0;
+};
+
+/// The rules of uploads and jobs: everything the outside can ask for, durable before it is answered.
+/// Thread-safe; calls may block on the disk, none computes except `keep_volume`, which verifies the whole
+/// file. Problems it gives (slugs): not-found, gone, bad-id, volume-in-use, insufficient-storage,
+/// content-too-large, queue-full, unknown-algorithm, and what the engine's `inspect` and `plan` give. Throws
+/// when the store itself fails.
+class JobService {
+ public:
+  JobService(JobServiceSettings settings,
+             Engine engine);  ///< opens and recovers the store; throws std::runtime_error
+  ~JobService();
+
+  void start();  ///< workers begin to claim jobs
+  void stop();   ///< stops claiming; running jobs are interrupted and requeued without counting against them
+
+  const Engine& engine() const;
+
+  tl::expected<IncomingFile, Problem> begin_upload(std::optional<std::int64_t> declared_bytes);
+  tl::expected<StoredVolume, Problem> keep_volume(IncomingFile file, const UploadOptions& options);
+  std::vector<StoredVolume> volumes();
+  tl::expected<StoredVolume, Problem> volume(std::string_view id);
+  tl::expected<StoredFile, Problem> volume_content(std::string_view id);
+  tl::expected<void, Problem> delete_volume(std::string_view id);
+
+  tl::expected<Job, Problem> submit(const JobOrder& order);
+  tl::expected<Job, Problem> job(std::string_view id);
+  tl::expected<JobPage, Problem> jobs(const JobQuery& query);
+  tl::expected<Job, Problem> cancel(std::string_view id);  ///< repeatable; a final job stays as it is
+  tl::expected<void, Problem> delete_job(
+      std::string_view id);  ///< repeatable; a running one is cancelled first
+  tl::expected<StoredFile, Problem> result(std::string_view job_id, std::string_view name);
+
+  /// The events of a job after `last_event_id` (empty: all that are kept).
+  tl::expected<std::vector<JobEvent>, Problem> events_after(std::string_view job_id,
+                                                            std::string_view last_event_id);
+
+  /// Calls `wake` from any thread whenever the job has news, until the returned handle is dropped.
+  using Subscription = std::shared_ptr<void>;
+  Subscription subscribe(std::string_view job_id, std::function<void()> wake);
+
+  /// Called once for every job that becomes final, with its document; for metrics. Set before `start`.
+  void on_final(std::function<void(const Job&)> observer);
+
+  ServiceStatistics statistics();
+  std::optional<std::string> not_ready_because();  ///< none: ready
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace volsmooth
