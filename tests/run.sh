@@ -1,0 +1,20 @@
+#!/usr/bin/env bash
+# Sets up a fresh Debian 12, then runs every test: formatting, unit, architecture and system tests, and the unit tests
+# again under the address and undefined-behaviour sanitizers.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+source client/setup.sh
+
+install_packages docker/build-packages.txt tests/packages.txt
+
+say "checking the formatting"
+mapfile -t sources < <(git ls-files '*.h' '*.cpp')
+clang-format --dry-run -Werror "${sources[@]}" || die "run: clang-format -i on the files above"
+
+build build -DVOLSMOOTH_TESTS=ON
+say "running the tests"
+ctest --test-dir build --output-on-failure --no-tests=error || die "tests failed; each failure is printed above"
+
+build build-sanitize -DVOLSMOOTH_TESTS=ON -DVOLSMOOTH_SANITIZE=address,undefined -DCMAKE_BUILD_TYPE=RelWithDebInfo -- unit_tests
+say "running the unit tests under the sanitizers"
+ctest --test-dir build-sanitize --output-on-failure --no-tests=error -L unit -j "$(nproc)" || die "tests failed under the sanitizers; each failure is printed above"
