@@ -10,7 +10,7 @@ head_file=/usr/share/mricron/templates/ch2.nii.gz
 out=demo-output
 packages=$(mktemp)
 trap 'rm -f "$packages"' EXIT
-printf '%s\n' mricron-data jq >"$packages"
+printf '%s\n' bsdextrautils jq mricron-data >"$packages"
 install_packages docker/build-packages.txt "$packages"
 
 tests_off=(-DVOLSMOOTH_TESTS=OFF)
