@@ -6,11 +6,11 @@
 
 namespace volsmooth {
 
-/// What one job or upload may take at most.
+/// What one upload or job may take at most.
 struct PipelineLimits {
   std::int64_t max_voxels = std::int64_t{1} << 31;
   double max_voxel_steps = 5e14;      ///< voxels x steps of one job: job-too-expensive
-  std::int64_t max_memory_bytes = 0;  ///< job-too-large; 0: no limit
+  std::int64_t max_memory_bytes = 0;  ///< of one job: job-too-large; 0: no limit
 };
 
 /// The computing side of the service: read -> flow -> surfaces -> write, on the core in algorithms/.

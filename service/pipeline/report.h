@@ -1,0 +1,39 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "algorithms/formats/nifti.h"
+#include "algorithms/surface/measures.h"
+#include "algorithms/volume/functionals.h"
+#include "service/jobs/job.h"
+
+namespace volsmooth {
+
+/// What one method did to the foliation.
+struct FoliationRow {
+  std::string method;
+  FoliationMeasures before, after;
+  WriteOutcome written;
+};
+
+/// What one method did to one isosurface.
+struct SurfaceRow {
+  std::string method;
+  double isovalue = 0;
+  SurfaceMeasures before, after;
+  std::optional<Displacement> moved;  ///< none: one of the two surfaces is empty
+};
+
+struct ReportTiming {
+  double read_seconds = 0, flow_seconds = 0, surface_seconds = 0, write_seconds = 0;
+};
+
+/// `report.json` of the contract.
+nlohmann::ordered_json report_document(const ComputeTask& task, const std::vector<std::string>& warnings,
+                                       const std::vector<FoliationRow>& foliation,
+                                       const std::vector<SurfaceRow>& surfaces, const ReportTiming& timing);
+
+}  // namespace volsmooth

@@ -1,0 +1,241 @@
+#include <fstream>
+
+#include "algorithms/catalog.h"
+#include "algorithms/formats/mesh_writers.h"
+#include "algorithms/formats/picture.h"
+#include "algorithms/surface/isosurface.h"
+#include "algorithms/surface/otsu.h"
+#include "algorithms/volume/parallel.h"
+#include "service/pipeline/reading.h"
+#include "service/pipeline/report.h"
+#include "service/pipeline/stage_clock.h"
+#include "service/pipeline/stages.h"
+
+namespace volsmooth {
+namespace {
+
+/// Rough seconds per voxel on two cores, good enough to weigh the stages against each other in the progress.
+constexpr double kReadCost = 12e-9, kStepCost = 1.2e-9, kMeasureCost = 1e-9, kSurfaceCost = 20e-9,
+                 kWriteCost = 15e-9;
+
+const char* const kOriginal = "original";
+
+/// The methods that an order runs side by side, each with its own resolved parameters.
+struct Part {
+  const Method* method;
+  ParameterValues parameters;
+};
+
+std::vector<Part> parts_of(const ComputeTask& task) {
+  const Grid grid{task.volume.facts.size, task.volume.facts.spacing_mm};
+  const Method* whole = find_method(task.order.method);
+  if (whole == nullptr) throw std::logic_error("order for a method that is not in the catalogue");
+  if (whole->info.parts.empty()) return {{whole, task.parameters}};
+  std::vector<Part> parts;
+  for (const std::string& name : whole->info.parts) {
+    const Method* method = find_method(name);
+    if (method == nullptr) throw std::logic_error("the catalogue names a part that is not in it");
+    parts.push_back({method, method->resolve(task.order.parameters, grid)});
+  }
+  return parts;
+}
+
+double steps_of(const Part& part) {
+  const auto steps = part.parameters.find("steps");
+  return steps == part.parameters.end() ? 1 : std::get<double>(steps->second);
+}
+
+double total_cost(const std::vector<Part>& parts, double isovalues, double voxels) {
+  double cost = kReadCost + kMeasureCost + isovalues * kSurfaceCost;
+  for (const Part& part : parts) {
+    cost += kStepCost * steps_of(part) + kMeasureCost + kWriteCost + isovalues * kSurfaceCost;
+  }
+  return cost * voxels;
+}
+
+/// One job from the uploaded file to the finished results.
+class JobRun {
+ public:
+  JobRun(const ComputeTask& task, const StageProgress& report)
+      : task_(task),
+        parts_(parts_of(task)),
+        voxels_(static_cast<double>(voxel_count(task.volume.facts.size))),
+        clock_(
+            total_cost(parts_, static_cast<double>(task.order.isovalues ? task.order.isovalues->size() : 1),
+                       voxels_),
+            report) {}
+
+  tl::expected<std::vector<Result>, Problem> run(const PipelineLimits& limits) {
+    auto loaded = clock_.run("read", kReadCost * voxels_, [&](const Progress& progress) {
+      return read_nifti(task_.volume_file, read_options(task_.volume.options, limits), progress);
+    });
+    if (!loaded) return tl::unexpected(problem_from(loaded.error()));
+    description_ = std::move(loaded->description);
+    warnings_ = description_.warnings;
+    original_ = loaded->volume;
+
+    measure_original();
+    if (parts_.size() > 1) write_meshes(kOriginal, original_surfaces_);
+    for (const Part& part : parts_) run_part(part);
+    write_report();
+    return std::move(results_);
+  }
+
+ private:
+  void measure_original() {
+    clock_.run("flow", kMeasureCost * voxels_,
+               [&](const Progress& progress) { original_foliation_ = measure(*original_, progress); });
+    isovalues_ = task_.order.isovalues ? *task_.order.isovalues : std::vector{otsu_threshold(*original_)};
+    original_surfaces_ = surfaces_of(*original_);
+    for (const Mesh& surface : original_surfaces_) original_measures_.push_back(measure(surface));
+  }
+
+  std::vector<Mesh> surfaces_of(const Volume& volume) {
+    const Frame frame = task_.order.mesh_frame.empty()    ? description_.map.frame
+                        : task_.order.mesh_frame == "LPS" ? Frame::kLps
+                                                          : Frame::kRas;
+    const VoxelToWorld map = in_frame(description_.map, frame);
+    std::vector<Mesh> surfaces;
+    for (const double isovalue : isovalues_) {
+      clock_.run("surfaces", kSurfaceCost / 2 * voxels_, [&](const Progress& progress) {
+        surfaces.push_back(extract_isosurface(volume, map, isovalue, {}, progress));
+      });
+    }
+    return surfaces;
+  }
+
+  void run_part(const Part& part) {
+    const std::string& name = part.method->info.name;
+    const bool last = &part == &parts_.back();
+    Volume::Pointer volume = copy_of(*original_);
+    FoliationRow foliation{name, original_foliation_, {}, {}};
+    clock_.run("flow", kStepCost * steps_of(part) * voxels_,
+               [&](const Progress& progress) { part.method->run(*volume, part.parameters, progress); });
+    clock_.run("flow", kMeasureCost * voxels_,
+               [&](const Progress& progress) { foliation.after = measure(*volume, progress); });
+
+    clock_.run("write", kWriteCost * voxels_, [&](const Progress& progress) {
+      foliation.written = write_volume(name, *volume, progress);
+      write_picture(new_result(name + ".png", "picture", name, "image/png"), *original_, *volume,
+                    description_.map, isovalues_);
+    });
+    if (last) original_ = nullptr;
+
+    const std::vector<Mesh> surfaces = surfaces_of(*volume);
+    for (std::size_t which = 0; which < surfaces.size(); ++which)
+      measure_surface(name, surfaces[which], which);
+    write_meshes(name, surfaces);
+    foliation_rows_.push_back(std::move(foliation));
+  }
+
+  WriteOutcome write_volume(const std::string& method, const Volume& volume, const Progress& progress) {
+    const auto& outputs = task_.order.outputs;
+    if (std::ranges::find(outputs, "nifti") == outputs.end()) return {};
+    const auto type =
+        task_.order.voxel_type == "float32" ? OutputVoxelType::kFloat32 : OutputVoxelType::kSame;
+    const auto file = new_result(method + ".nii.gz", "volume", method, "application/gzip");
+    results_.back().frame = name_of(description_.map.frame);
+    const WriteOutcome written = write_nifti(file, volume, description_.header, type, progress);
+    if (written.clipped_voxels > 0) {
+      warnings_.push_back("clipped-voxels: " + std::to_string(written.clipped_voxels) + " voxels of " +
+                          method + " were outside what " + description_.voxel_type + " can hold.");
+    }
+    return written;
+  }
+
+  void measure_surface(const std::string& method, const Mesh& surface, std::size_t which) {
+    SurfaceRow row{method, isovalues_[which], original_measures_[which], {}, {}};
+    clock_.run("surfaces", kSurfaceCost / 2 * voxels_, [&](const Progress& progress) {
+      row.after = measure(surface);
+      if (surface.triangles.empty()) {
+        warnings_.push_back("no-surface: " + method + " leaves nothing at isovalue " +
+                            isovalue_text(isovalues_[which]) + ", so there is no file for it.");
+      } else if (!original_surfaces_[which].triangles.empty()) {
+        row.moved = displacement(surface, original_surfaces_[which], progress);
+      }
+    });
+    surface_rows_.push_back(std::move(row));
+  }
+
+  void write_meshes(const std::string& method, const std::vector<Mesh>& surfaces) {
+    for (const std::string& name : task_.order.mesh_formats) {
+      const MeshFormat* format = find_mesh_format(name);
+      if (format == nullptr) throw std::logic_error("order for a mesh format that is not in the table");
+      clock_.run("write", 0,
+                 [&](const Progress& progress) { write_meshes_as(*format, method, surfaces, progress); });
+    }
+  }
+
+  void write_meshes_as(const MeshFormat& format, const std::string& method, const std::vector<Mesh>& surfaces,
+                       const Progress& progress) {
+    std::vector<std::span<const Mesh>> files;
+    if (format.many_surfaces) {
+      files.emplace_back(surfaces);
+    } else {
+      for (const Mesh& surface : surfaces) files.emplace_back(&surface, 1);
+    }
+    for (const std::span<const Mesh> meshes : files) {
+      std::vector<double> isovalues;
+      for (const Mesh& mesh : meshes) {
+        if (!mesh.triangles.empty()) isovalues.push_back(mesh.isovalue);
+      }
+      if (isovalues.empty()) continue;
+      const std::string suffix = format.many_surfaces ? "" : "_iso" + isovalue_text(isovalues.front());
+      const auto file = new_result(method + suffix + "." + format.name, "surface", method, format.media_type);
+      Result& result = results_.back();
+      result.isovalues = std::move(isovalues);
+      result.many_surfaces = format.many_surfaces;
+      result.frame = name_of(meshes.front().frame);
+      format.write(file, meshes, progress);
+    }
+  }
+
+  std::filesystem::path new_result(const std::string& name, const char* kind, const std::string& method,
+                                   const std::string& media_type) {
+    Result result;
+    result.name = name;
+    result.kind = kind;
+    result.method = method;
+    result.media_type = media_type;
+    results_.push_back(std::move(result));
+    return task_.output_dir / name;
+  }
+
+  void write_report() {
+    const ReportTiming timing{clock_.seconds("read"), clock_.seconds("flow"), clock_.seconds("surfaces"),
+                              clock_.seconds("write")};
+    const auto document = report_document(task_, warnings_, foliation_rows_, surface_rows_, timing);
+    const auto file = new_result("report.json", "report", task_.order.method, "application/json");
+    std::ofstream out(file);
+    out << document.dump(2) << '\n';
+    out.close();
+    if (!out) throw std::system_error(errno, std::generic_category(), "writing the report");
+  }
+
+  const ComputeTask& task_;
+  const std::vector<Part> parts_;
+  const double voxels_;
+  StageClock clock_;
+  VolumeDescription description_;
+  Volume::Pointer original_;
+  std::vector<double> isovalues_;
+  FoliationMeasures original_foliation_;
+  std::vector<Mesh> original_surfaces_;
+  std::vector<SurfaceMeasures> original_measures_;
+  std::vector<FoliationRow> foliation_rows_;
+  std::vector<SurfaceRow> surface_rows_;
+  std::vector<std::string> warnings_;
+  std::vector<Result> results_;
+};
+
+}  // namespace
+
+tl::expected<std::vector<Result>, Problem> run_job(const ComputeTask& task, const StageProgress& report,
+                                                   const PipelineLimits& limits) {
+  lower_thread_priority();
+  tl::expected<std::vector<Result>, Problem> outcome;
+  with_threads(task.threads, [&] { outcome = JobRun(task, report).run(limits); });
+  return outcome;
+}
+
+}  // namespace volsmooth

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <filesystem>
+#include <tl/expected.hpp>
+#include <vector>
+
+#include "service/jobs/job.h"
+#include "service/pipeline/pipeline.h"
+
+namespace volsmooth {
+
+/// The three functions of an `Engine`; what each promises stands there.
+tl::expected<VolumeFacts, Problem> inspect_upload(const std::filesystem::path& file,
+                                                  const UploadOptions& options, const PipelineLimits& limits);
+tl::expected<JobPlan, Problem> plan_job(const JobOrder& order, const VolumeFacts& volume,
+                                        const PipelineLimits& limits);
+tl::expected<std::vector<Result>, Problem> run_job(const ComputeTask& task, const StageProgress& report,
+                                                   const PipelineLimits& limits);
+
+}  // namespace volsmooth
