@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <fstream>
+#include <system_error>
 
 #include "algorithms/catalog.h"
 #include "algorithms/formats/mesh_writers.h"
