@@ -1,0 +1,93 @@
+#include <gtest/gtest.h>
+
+#include "service/pipeline/stages.h"
+
+namespace volsmooth {
+namespace {
+
+VolumeFacts head(std::int64_t edge = 256) {
+  VolumeFacts facts;
+  facts.size = {edge, edge, edge};
+  facts.spacing_mm = {1, 1, 1};
+  facts.intensity_min = -1024;
+  facts.intensity_max = 3000;
+  return facts;
+}
+
+JobOrder order(const std::string& method, double flow_time_mm2, std::vector<double> isovalues = {300}) {
+  JobOrder order;
+  order.method = method;
+  order.parameters = {{"flow_time_mm2", flow_time_mm2}};
+  order.isovalues = std::move(isovalues);
+  return order;
+}
+
+double number(const JobPlan& plan, const std::string& name) {
+  return std::get<double>(plan.parameters.at(name));
+}
+
+TEST(Plan, TheStepsReachTheFlowTime) {
+  for (const double flow_time : {0.01, 1.0, 25.0}) {
+    const auto plan = plan_job(order("mean-curvature-flow", flow_time), head(), {});
+    ASSERT_TRUE(plan);
+    EXPECT_DOUBLE_EQ(number(*plan, "flow_time_mm2"), flow_time);
+    EXPECT_NEAR(number(*plan, "steps") * number(*plan, "step_mm2"), flow_time, 1e-12 * flow_time);
+  }
+}
+
+TEST(Plan, ABareOrderRemovesFeaturesOfTwoVoxels) {
+  JobOrder bare;
+  VolumeFacts facts = head();
+  facts.spacing_mm = {1, 2, 4};
+  const auto plan = plan_job(bare, facts, {});
+  ASSERT_TRUE(plan);
+  EXPECT_NEAR(number(*plan, "feature_radius_mm"), 4.0, 1e-12);  // twice the geometric mean of 1, 2 and 4
+  EXPECT_NEAR(number(*plan, "flow_time_mm2"), 4.0, 1e-12);      // r^2 / 4
+}
+
+TEST(Plan, AnIsovalueOutsideTheVolumeIsRefusedWithTheRange) {
+  for (const double isovalue : {-1025.0, 3001.0}) {
+    const auto plan = plan_job(order("mean-curvature-flow", 1, {300, isovalue}), head(), {});
+    ASSERT_FALSE(plan);
+    EXPECT_EQ(plan.error().slug, "bad-parameter");
+    EXPECT_EQ(plan.error().members.at("member"), "isovalues");
+    EXPECT_EQ(plan.error().members.at("minimum"), -1024);
+    EXPECT_EQ(plan.error().members.at("maximum"), 3000);
+  }
+  EXPECT_TRUE(plan_job(order("mean-curvature-flow", 1, {-1024, 3000}), head(), {}));
+}
+
+TEST(Plan, WhatTheContractPromisesIsWithinTheLimits) {
+  EXPECT_TRUE(plan_job(order("mean-curvature-flow", 10'000), head(1024), {}));
+  EXPECT_TRUE(plan_job(order("compare", 10'000), head(1024), {}));
+}
+
+TEST(Plan, AJobThatCostsTooMuchIsRefusedWithBothNumbers) {
+  const auto plan = plan_job(order("mean-curvature-flow", 1e6), head(1024), {});
+  ASSERT_FALSE(plan);
+  EXPECT_EQ(plan.error().slug, "job-too-expensive");
+  EXPECT_GT(plan.error().members.at("estimate_voxel_steps"), plan.error().members.at("limit_voxel_steps"));
+}
+
+TEST(Plan, AJobThatNeedsTooMuchMemoryIsRefusedWithBothNumbers) {
+  PipelineLimits limits;
+  limits.max_memory_bytes = std::int64_t{1} << 30;
+  EXPECT_TRUE(plan_job(order("mean-curvature-flow", 1), head(256), limits));
+  const auto plan = plan_job(order("mean-curvature-flow", 1), head(1024), limits);
+  ASSERT_FALSE(plan);
+  EXPECT_EQ(plan.error().slug, "job-too-large");
+  EXPECT_GT(plan.error().members.at("estimate_bytes"), plan.error().members.at("limit_bytes"));
+}
+
+TEST(Plan, CompareCostsItsPartsTogether) {
+  // The limit lies between one flow and both.
+  PipelineLimits limits;
+  const auto flow = plan_job(order("mean-curvature-flow", 25), head(), limits);
+  ASSERT_TRUE(flow);
+  limits.max_voxel_steps = number(*flow, "steps") * 256.0 * 256.0 * 256.0;
+  EXPECT_TRUE(plan_job(order("mean-curvature-flow", 25), head(), limits));
+  EXPECT_FALSE(plan_job(order("compare", 25), head(), limits));
+}
+
+}  // namespace
+}  // namespace volsmooth
