@@ -1,0 +1,117 @@
+#pragma once
+
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+struct sqlite3;
+struct sqlite3_stmt;
+
+namespace volsmooth {
+
+/// The database did not do what it was told.
+class DatabaseError : public std::runtime_error {
+ public:
+  DatabaseError(int sqlite_code, const std::string& message);
+  int code() const { return code_; }  ///< SQLite's primary result code
+
+ private:
+  int code_;
+};
+
+/// One prepared statement with its values bound; read row by row.
+class Statement {
+ public:
+  Statement(sqlite3* connection, std::string_view sql);
+
+  /// Binds the next `?` (from the left, or ?1, ?2, ...).
+  Statement& bind(double value);
+  Statement& bind(std::string_view value);
+  Statement& bind(std::nullptr_t);
+  Statement& bind(const char* value) { return bind(std::string_view(value)); }
+  Statement& bind(const std::string& value) { return bind(std::string_view(value)); }
+  Statement& bind(std::integral auto value) { return bind_integer(static_cast<std::int64_t>(value)); }
+  template <class T>
+  Statement& bind(const std::optional<T>& value) {
+    return value ? bind(*value) : bind(nullptr);
+  }
+
+  bool step();  ///< true: there is a row to read
+  std::int64_t integer(int column) const;
+  double real(int column) const;
+  std::string text(int column) const;
+  bool is_null(int column) const;
+
+ private:
+  Statement& bind_integer(std::int64_t value);
+  void check(int code) const;
+
+  struct Finalize {
+    void operator()(sqlite3_stmt* statement) const;
+  };
+  std::unique_ptr<sqlite3_stmt, Finalize> statement_;
+  int bound_ = 0;
+};
+
+/// One connection to a SQLite file in WAL mode; used by one thread at a time. Keep to one writer for a file
+/// and let it outlive the readers: only a writer checkpoints (SQLite before 3.51.3 can corrupt the file when
+/// two connections write or checkpoint at once).
+class Database {
+ public:
+  enum class Access { kWriter, kReader };
+  Database(const std::filesystem::path& file, Access access);
+
+  void execute(const char* sql);  ///< any number of statements, without values
+
+  template <class... Values>
+  Statement query(std::string_view sql, const Values&... values) {
+    Statement statement(connection_.get(), sql);
+    (statement.bind(values), ...);
+    return statement;
+  }
+
+  /// Runs a statement that gives no rows; returns how many rows it changed.
+  template <class... Values>
+  int run(std::string_view sql, const Values&... values) {
+    query(sql, values...).step();
+    return changes();
+  }
+
+  /// True once a commit failed in a way that leaves open whether it will be there after a restart. The
+  /// connection then refuses every further transaction.
+  bool condemned() const { return condemned_; }
+
+ private:
+  friend class Transaction;
+  int changes() const;
+
+  struct Close {
+    void operator()(sqlite3* connection) const;
+  };
+  std::unique_ptr<sqlite3, Close> connection_;
+  bool condemned_ = false;
+};
+
+/// All or nothing: what is not committed when it goes is undone. Of a reader: one state of the data.
+class Transaction {
+ public:
+  enum class Kind { kRead, kWrite };
+  Transaction(Database& database, Kind kind);
+  Transaction(const Transaction&) = delete;
+  Transaction& operator=(const Transaction&) = delete;
+  ~Transaction();
+
+  void commit();  ///< durable when it returns
+
+ private:
+  Database& database_;
+  bool open_ = true;
+};
+
+}  // namespace volsmooth

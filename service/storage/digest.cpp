@@ -1,0 +1,67 @@
+#include "service/storage/digest.h"
+
+#include <fcntl.h>
+#include <openssl/evp.h>
+
+#include <array>
+#include <stdexcept>
+#include <string_view>
+#include <vector>
+
+#include "service/storage/posix.h"
+
+namespace volsmooth {
+namespace {
+
+constexpr std::size_t kBlockBytes = std::size_t{1} << 20;
+
+EVP_MD_CTX* as_context(void* pointer) {
+  return static_cast<EVP_MD_CTX*>(pointer);
+}
+
+void require(int ok) {
+  if (ok != 1) throw std::runtime_error("SHA-256 is not available");
+}
+
+}  // namespace
+
+void Sha256::Free::operator()(void* context) const {
+  EVP_MD_CTX_free(as_context(context));
+}
+
+Sha256::Sha256() : context_(EVP_MD_CTX_new()) {
+  require(EVP_DigestInit_ex(as_context(context_.get()), EVP_sha256(), nullptr));
+}
+
+void Sha256::update(std::span<const std::byte> bytes) {
+  require(EVP_DigestUpdate(as_context(context_.get()), bytes.data(), bytes.size()));
+}
+
+std::string Sha256::hex() {
+  std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
+  unsigned int length = 0;
+  require(EVP_DigestFinal_ex(as_context(context_.get()), digest.data(), &length));
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  std::string text;
+  for (unsigned int i = 0; i < length; ++i) {
+    text += kDigits[digest[i] >> 4];
+    text += kDigits[digest[i] & 15];
+  }
+  return text;
+}
+
+FileDigest digest_of(const std::filesystem::path& file, const std::function<void()>& between_blocks) {
+  const FileDescriptor input = open_file(file, O_RDONLY);
+  std::vector<std::byte> block(kBlockBytes);
+  Sha256 sha256;
+  FileDigest result;
+  while (const std::size_t got = read_some(input, block)) {
+    sha256.update(std::span(block).first(got));
+    result.bytes += static_cast<std::int64_t>(got);
+    between_blocks();
+  }
+  result.sha256 = sha256.hex();
+  return result;
+}
+
+}  // namespace volsmooth

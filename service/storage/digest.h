@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+
+namespace volsmooth {
+
+/// SHA-256 of bytes that come in pieces.
+class Sha256 {
+ public:
+  Sha256();
+  void update(std::span<const std::byte> bytes);
+  std::string hex();  ///< ends it: no update may follow
+
+ private:
+  struct Free {
+    void operator()(void* context) const;
+  };
+  std::unique_ptr<void, Free> context_;
+};
+
+struct FileDigest {
+  std::int64_t bytes = 0;
+  std::string sha256;
+};
+
+/// Reads a whole file; calls `between_blocks` every few megabytes, which may throw to end it. Throws
+/// std::system_error.
+FileDigest digest_of(
+    const std::filesystem::path& file, const std::function<void()>& between_blocks = [] {});
+
+}  // namespace volsmooth
