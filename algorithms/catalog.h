@@ -15,10 +15,10 @@ struct Method {
 
   /// Resolves parameters that were checked against `info.parameters` into all that `run` will do: defaults
   /// filled in from the grid, `flow_time_mm2`, `feature_radius_mm`, `step_mm2`, `steps`.
-  std::function<ParameterValues(const ParameterValues& asked, const Grid& grid)> resolve;
+  std::function<ParameterValues(const ParameterValues& asked, const Grid& grid)> resolve = {};
 
   /// Transforms `volume` in place; takes what `resolve` gave. Empty for a method that is made of `parts`.
-  std::function<void(Volume& volume, const ParameterValues& resolved, const Progress& report)> run;
+  std::function<void(Volume& volume, const ParameterValues& resolved, const Progress& report)> run = {};
 
   /// Bytes held at the peak of `run` beyond the volume itself, per voxel.
   double extra_bytes_per_voxel = 0;

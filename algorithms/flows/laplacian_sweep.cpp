@@ -1,0 +1,92 @@
+#include "algorithms/flows/laplacian_sweep.h"
+
+#include <algorithm>
+
+#include "algorithms/numerics/diffusion.h"
+#include "algorithms/numerics/reflection.h"
+
+namespace volsmooth {
+namespace {
+
+/// A row along x with the rows beside it along y and z.
+struct DiffusedRow {
+  std::int64_t count;
+  const float* rho;
+  std::array<const float*, 2> before, after;  ///< along y, z
+  std::array<float, 3> factors;
+  float* diffused;  ///< out
+};
+
+VOLSMOOTH_FORMULA float diffused_at(const DiffusedRow& row, std::int64_t x, std::int64_t left,
+                                    std::int64_t right) {
+  return diffused(row.rho[x],
+                  Neighbours<float>{.before = {row.rho[left], row.before[0][x], row.before[1][x]},
+                                    .after = {row.rho[right], row.after[0][x], row.after[1][x]}},
+                  row.factors);
+}
+
+VOLSMOOTH_FORMULA void diffuse_row(DiffusedRow row) {
+  const std::int64_t last = row.count - 1;
+  row.diffused[0] = diffused_at(row, 0, 0, std::min<std::int64_t>(1, last));
+#pragma GCC ivdep
+  for (std::int64_t x = 1; x < last; ++x) row.diffused[x] = diffused_at(row, x, x - 1, x + 1);
+  if (last > 0) row.diffused[last] = diffused_at(row, last, last - 1, last);
+}
+
+void diffuse_baseline(const DiffusedRow& row) {
+  diffuse_row(row);
+}
+VOLSMOOTH_AVX2 void diffuse_avx2(const DiffusedRow& row) {
+  diffuse_row(row);
+}
+VOLSMOOTH_AVX512 void diffuse_avx512(const DiffusedRow& row) {
+  diffuse_row(row);
+}
+
+using DiffuseRow = void (*)(const DiffusedRow&);
+
+DiffuseRow diffuse_row_for(InstructionSet set) {
+  switch (set) {
+    case InstructionSet::kAvx512:
+      return diffuse_avx512;
+    case InstructionSet::kAvx2:
+      return diffuse_avx2;
+    default:
+      return diffuse_baseline;
+  }
+}
+
+TileShape cached_tile(const Size3& size) {
+  constexpr std::int64_t kVoxelsOfPlane = 32768;
+  return {.rows = std::clamp<std::int64_t>(kVoxelsOfPlane / size[0], 4, 512), .planes = 48};
+}
+
+}  // namespace
+
+void laplacian_step(std::span<const float> from, std::span<float> to, const Grid& grid, double step_mm2,
+                    InstructionSet set, const TileShape& shape, const Progress& report) {
+  const Size3 size = grid.size;
+  const auto factors = flux_per_difference<float>(grid.spacing_mm, step_mm2);
+  const DiffuseRow diffuse = diffuse_row_for(set);
+  const auto row = [&](std::int64_t y, std::int64_t z) {
+    return from.data() + (reflected(z, size[2]) * size[1] + reflected(y, size[1])) * size[0];
+  };
+  const auto sweep = [&](const Tile& tile) {
+    for (std::int64_t z = tile.z_begin; z < tile.z_end; ++z)
+      for (std::int64_t y = tile.y_begin; y < tile.y_end; ++y)
+        diffuse({size[0],
+                 row(y, z),
+                 {row(y - 1, z), row(y, z - 1)},
+                 {row(y + 1, z), row(y, z + 1)},
+                 factors,
+                 to.data() + (z * size[1] + y) * size[0]});
+  };
+  for_each_tile(size, shape, sweep, report);
+}
+
+void laplacian_step(std::span<const float> from, std::span<float> to, const Grid& grid, double step_mm2,
+                    const Progress& report) {
+  laplacian_step(from, to, grid, step_mm2, instruction_sets().back(), cached_tile(grid.size), report);
+}
+
+}  // namespace volsmooth

@@ -1,0 +1,78 @@
+#include "algorithms/volume/functionals.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "algorithms/numerics/reflection.h"
+#include "algorithms/volume/parallel.h"
+
+namespace volsmooth {
+namespace {
+
+/// A volume's voxels as rows along x, mirrored beyond its border.
+struct Rows {
+  const float* voxels;
+  Size3 size;
+
+  const float* operator()(std::int64_t y, std::int64_t z) const {
+    return voxels + (reflected(z, size[2]) * size[1] + reflected(y, size[1])) * size[0];
+  }
+};
+
+/// The sums of row (y, z): intensities, and lengths of the gradient.
+FoliationMeasures measure_row(const Rows& rows, const Vector3& per_mm, std::int64_t y, std::int64_t z) {
+  const float* here = rows(y, z);
+  const float *south = rows(y - 1, z), *north = rows(y + 1, z), *below = rows(y, z - 1),
+              *above = rows(y, z + 1);
+  FoliationMeasures sums{.minimum = here[0], .maximum = here[0]};
+  for (std::int64_t x = 0; x < rows.size[0]; ++x) {
+    const double dx =
+        (double{here[reflected(x + 1, rows.size[0])]} - here[reflected(x - 1, rows.size[0])]) * per_mm[0];
+    const double dy = (double{north[x]} - south[x]) * per_mm[1];
+    const double dz = (double{above[x]} - below[x]) * per_mm[2];
+    sums.area += std::sqrt(dx * dx + dy * dy + dz * dz);
+    sums.mass += here[x];
+    sums.minimum = std::min(sums.minimum, here[x]);
+    sums.maximum = std::max(sums.maximum, here[x]);
+  }
+  return sums;
+}
+
+void add(FoliationMeasures& sums, const FoliationMeasures& more) {
+  sums.mass += more.mass;
+  sums.area += more.area;
+  sums.minimum = std::min(sums.minimum, more.minimum);
+  sums.maximum = std::max(sums.maximum, more.maximum);
+}
+
+}  // namespace
+
+FoliationMeasures measure(const Volume& volume, const Progress& report) {
+  const Grid grid = grid_of(volume);
+  const Rows rows{volume.GetBufferPointer(), grid.size};
+  Vector3 per_mm;
+  for (std::size_t axis = 0; axis < 3; ++axis) per_mm[axis] = 0.5 / grid.spacing_mm[axis];
+
+  const std::int64_t row_count = grid.size[1] * grid.size[2];
+  constexpr std::int64_t kRowsOfChunk = 256;
+  const FoliationMeasures none{.minimum = rows.voxels[0], .maximum = rows.voxels[0]};
+  std::vector<FoliationMeasures> chunks(
+      static_cast<std::size_t>((row_count + kRowsOfChunk - 1) / kRowsOfChunk), none);
+  parallel_for(
+      row_count, kRowsOfChunk,
+      [&](std::int64_t begin, std::int64_t end) {
+        FoliationMeasures& chunk = chunks[static_cast<std::size_t>(begin / kRowsOfChunk)];
+        for (std::int64_t row = begin; row < end; ++row)
+          add(chunk, measure_row(rows, per_mm, row % grid.size[1], row / grid.size[1]));
+      },
+      report);
+
+  FoliationMeasures total = none;
+  for (const FoliationMeasures& chunk : chunks) add(total, chunk);
+  total.mass *= voxel_volume_mm3(grid.spacing_mm);
+  total.area *= voxel_volume_mm3(grid.spacing_mm);
+  return total;
+}
+
+}  // namespace volsmooth

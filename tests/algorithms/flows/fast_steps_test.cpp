@@ -1,0 +1,77 @@
+// The fast steps are held to the plain ones, byte for byte.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "algorithms/flows/laplacian_sweep.h"
+#include "algorithms/flows/mean_curvature_sweep.h"
+#include "algorithms/flows/plain_steps.h"
+#include "tests/support/phantoms.h"
+
+namespace volsmooth {
+namespace {
+
+using PlainStep = void (*)(std::span<const float>, std::span<float>, const Grid&, double);
+using TunedStep = void (*)(std::span<const float>, std::span<float>, const Grid&, double, InstructionSet,
+                           const TileShape&, const Progress&);
+
+struct Flow {
+  const char* name;
+  PlainStep plain;
+  TunedStep fast;
+};
+
+const Flow kFlows[] = {{"MeanCurvature", plain_mean_curvature_step<float>, mean_curvature_step},
+                       {"Laplacian", plain_laplacian_step<float>, laplacian_step}};
+
+struct Case {
+  Flow flow;
+  Grid grid;
+  TileShape tile;
+};
+
+std::vector<Case> cases() {
+  const TileShape whole{64, 48}, small{3, 2}, single{1, 1};
+  const std::pair<Grid, TileShape> grids[] = {
+      {{{17, 13, 11}, {1, 1, 1}}, whole},       {{{17, 13, 11}, {0.7, 1.1, 2.5}}, small},
+      {{{16, 8, 8}, {2, 1, 1}}, single},        {{{33, 5, 7}, {1e-3, 0.5, 1}}, small},
+      {{{1, 1, 1}, {1, 2, 3}}, whole},          {{{1, 19, 7}, {1, 1, 1}}, whole},
+      {{{19, 1, 7}, {1, 1, 3}}, small},         {{{19, 7, 1}, {1, 1, 1}}, small},
+      {{{2, 2, 2}, {1, 1, 1}}, single},         {{{3, 2, 1}, {1, 1, 1}}, whole},
+      {{{257, 3, 2}, {900, 900, 1000}}, whole}, {{{1, 1, 29}, {1, 1, 1}}, small},
+      {{{29, 1, 1}, {1, 1, 1}}, whole},         {{{15, 31, 31}, {1, 1, 1.5}}, {8, 5}},
+  };
+  std::vector<Case> all;
+  for (const Flow& flow : kFlows)
+    for (const auto& [grid, tile] : grids) all.push_back({flow, grid, tile});
+  return all;
+}
+
+std::string name_of_case(const testing::TestParamInfo<Case>& info) {
+  std::string name = info.param.flow.name;
+  for (const std::int64_t n : info.param.grid.size) name.append("_").append(std::to_string(n));
+  return name.append("_").append(std::to_string(info.index));
+}
+
+class FastStep : public testing::TestWithParam<Case> {};
+
+TEST_P(FastStep, GivesTheBytesOfThePlainOneOnNoise) {
+  const auto& [flow, grid, tile] = GetParam();
+  const double smallest = *std::ranges::min_element(grid.spacing_mm);
+  const double step = 0.05 * smallest * smallest;
+  std::vector<float> plain = noise(grid.size, 7, -1000, 1000), next(plain.size());
+  std::vector<std::vector<float>> fast(instruction_sets().size(), plain);
+  for (int count = 0; count < 3; ++count) {
+    flow.plain(plain, next, grid, step);
+    plain.swap(next);
+    for (std::size_t set = 0; set < fast.size(); ++set) {
+      flow.fast(fast[set], next, grid, step, instruction_sets()[set], tile, no_progress);
+      fast[set].swap(next);
+      EXPECT_EQ(fast[set], plain) << "instruction set " << set << ", step " << count;
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Grids, FastStep, testing::ValuesIn(cases()), name_of_case);
+
+}  // namespace
+}  // namespace volsmooth
