@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "algorithms/volume/parallel.h"
+
 namespace volsmooth {
 
 Volume::Pointer make_volume(const Size3& size, const VoxelToWorld& map) {
@@ -45,12 +47,18 @@ std::span<const float> voxels_of(const Volume& volume) {
   return {volume.GetBufferPointer(), volume.GetBufferedRegion().GetNumberOfPixels()};
 }
 
-Volume::Pointer copy_of(const Volume& volume) {
+Volume::Pointer copy_of(const Volume& volume, const Progress& report) {
+  constexpr std::int64_t kVoxelsPerChunk = std::int64_t{1} << 22;
   auto copy = Volume::New();
   copy->CopyInformation(&volume);
   copy->SetRegions(volume.GetBufferedRegion());
   copy->Allocate();
-  std::ranges::copy(voxels_of(volume), copy->GetBufferPointer());
+  const std::span<const float> from = voxels_of(volume);
+  float* const to = copy->GetBufferPointer();
+  parallel_for(
+      std::ssize(from), kVoxelsPerChunk,
+      [&](std::int64_t begin, std::int64_t end) { std::copy(&from[0] + begin, &from[0] + end, to + begin); },
+      report);
   return copy;
 }
 

@@ -4,6 +4,7 @@
 
 #include <span>
 
+#include "algorithms/progress.h"
 #include "algorithms/volume/geometry.h"
 
 namespace volsmooth {
@@ -21,6 +22,6 @@ Volume::Pointer make_volume(const Grid& grid);
 Grid grid_of(const Volume& volume);
 std::span<float> voxels_of(Volume& volume);
 std::span<const float> voxels_of(const Volume& volume);
-Volume::Pointer copy_of(const Volume& volume);
+Volume::Pointer copy_of(const Volume& volume, const Progress& report = no_progress);
 
 }  // namespace volsmooth
