@@ -75,7 +75,8 @@ tl::expected<JobPlan, Problem> plan_job(const JobOrder& order, const VolumeFacts
                 {{"estimate_voxel_steps", voxel_steps}, {"limit_voxel_steps", limits.max_voxel_steps}}});
   }
 
-  const double bytes_per_voxel = kVolumeBytesPerVoxel + extra_bytes_per_voxel(method) +
+  const double volumes_held = method.info.parts.size() > 1 ? 2 : 1;
+  const double bytes_per_voxel = kVolumeBytesPerVoxel * volumes_held + extra_bytes_per_voxel(method) +
                                  (order.isovalues && order.isovalues->empty() ? 0 : kSurfaceBytesPerVoxel);
   plan.memory_bytes = kFixedBytes + static_cast<std::int64_t>(std::ceil(voxels * bytes_per_voxel));
   if (limits.max_memory_bytes > 0 && plan.memory_bytes > limits.max_memory_bytes) {

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <fstream>
 #include <system_error>
+#include <utility>
 
 #include "algorithms/catalog.h"
 #include "algorithms/formats/mesh_writers.h"
@@ -88,6 +89,7 @@ class JobRun {
     clock_.run("flow", kMeasureCost * voxels_,
                [&](const Progress& progress) { original_foliation_ = measure(*original_, progress); });
     isovalues_ = task_.order.isovalues ? *task_.order.isovalues : std::vector{otsu_threshold(*original_)};
+    original_slices_ = middle_slices(*original_, description_.map);
     original_surfaces_ = surfaces_of(*original_);
     for (const Mesh& surface : original_surfaces_) original_measures_.push_back(measure(surface));
   }
@@ -108,8 +110,7 @@ class JobRun {
 
   void run_part(const Part& part) {
     const std::string& name = part.method->info.name;
-    const bool last = &part == &parts_.back();
-    Volume::Pointer volume = copy_of(*original_);
+    const Volume::Pointer volume = volume_for(part);
     FoliationRow foliation{name, original_foliation_, {}, {}};
     clock_.run("flow", kStepCost * steps_of(part) * voxels_,
                [&](const Progress& progress) { part.method->run(*volume, part.parameters, progress); });
@@ -121,13 +122,18 @@ class JobRun {
       write_picture(new_result(name + ".png", "picture", name, "image/png"), *original_, *volume,
                     description_.map, isovalues_);
     });
-    if (last) original_ = nullptr;
 
     const std::vector<Mesh> surfaces = surfaces_of(*volume);
     for (std::size_t which = 0; which < surfaces.size(); ++which)
       measure_surface(name, surfaces[which], which);
     write_meshes(name, surfaces);
     foliation_rows_.push_back(std::move(foliation));
+  }
+
+  /// The input for `part` to work on: the only one when no later part needs it.
+  Volume::Pointer volume_for(const Part& part) {
+    if (&part == &parts_.back()) return std::exchange(original_, nullptr);
+    return clock_.run("read", 0, [&](const Progress& progress) { return copy_of(*original_, progress); });
   }
 
   WriteOutcome write_volume(const std::string& method, const Volume& volume, const Progress& progress) {
@@ -220,6 +226,7 @@ class JobRun {
   StageClock clock_;
   VolumeDescription description_;
   Volume::Pointer original_;
+  MiddleSlices original_slices_;
   std::vector<double> isovalues_;
   FoliationMeasures original_foliation_;
   std::vector<Mesh> original_surfaces_;
