@@ -16,11 +16,12 @@ struct Mesh {
   Frame frame = Frame::kRas;
   double isovalue = 0;
   std::vector<Float3> positions;
-  std::vector<Float3> normals;  ///< unit, outward, one per vertex
-  std::vector<float>
-      curvatures;  ///< kappa1 + kappa2 in 1/mm, one per vertex, positive on a ball; of no meaning on caps
+  std::vector<Float3> normals;    ///< unit, outward, one per vertex
+  std::vector<float> curvatures;  ///< kappa1 + kappa2 in 1/mm, one per vertex, positive on a ball; 0 on caps
   std::vector<Triangle> triangles;
-  std::vector<bool> triangle_on_cap;  ///< one per triangle: closes the surface where the volume ends
+  /// One per triangle: 1 where it closes the surface at the border of the volume, else 0. (Bytes, since
+  /// several threads write them at once.)
+  std::vector<std::uint8_t> triangle_on_cap;
 };
 
 }  // namespace volsmooth

@@ -1,0 +1,126 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "algorithms/surface/measures.h"
+#include "algorithms/surface/triangle_tree.h"
+#include "algorithms/surface/triangles_at_vertices.h"
+#include "algorithms/surface/vector_math.h"
+#include "algorithms/volume/parallel.h"
+
+namespace volsmooth {
+namespace {
+
+constexpr std::int64_t kPerChunk = 1 << 11;
+
+/// Triangles that are no caps. A cap says where the volume ends, not where the surface is.
+std::vector<std::uint32_t> free_triangles(const Mesh& mesh) {
+  std::vector<std::uint32_t> chosen;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    if (mesh.triangle_on_cap[t] == 0) chosen.push_back(static_cast<std::uint32_t>(t));
+  }
+  return chosen;
+}
+
+/// A third of the area of the triangles without caps round every vertex.
+std::vector<double> vertex_areas(const Mesh& mesh) {
+  std::vector<double> areas(mesh.positions.size());
+  for (std::uint32_t t : free_triangles(mesh)) {
+    const double area = 0.5 * length(area_normal(corners_of(mesh, mesh.triangles[t])));
+    for (std::uint32_t vertex : mesh.triangles[t]) areas[vertex] += area / 3;
+  }
+  return areas;
+}
+
+/// The original surface without caps: nearest points, and the side they are seen from.
+class SignedDistance {
+ public:
+  SignedDistance(const Mesh& mesh, std::vector<std::uint32_t> triangles)
+      : mesh_(mesh), at_vertices_(mesh), tree_(mesh, std::move(triangles)) {}
+
+  /// Positive outside. `guess` is a triangle to start from, and becomes the nearest one.
+  double operator()(const Vector3& from, std::uint32_t& guess) const {
+    const NearestPoint nearest = tree_.nearest(from, guess);
+    guess = nearest.triangle;
+    return std::copysign(std::sqrt(nearest.squared_distance), dot(from - nearest.point, normal_at(nearest)));
+  }
+
+ private:
+  /// The angle-weighted normal of the face, edge or vertex that the point lies on; its sign is right wherever
+  /// the nearest point lies (Baerentzen and Aanaes 2005).
+  Vector3 normal_at(const NearestPoint& nearest) const {
+    const Triangle& face = mesh_.triangles[nearest.triangle];
+    if (nearest.corners == 7) return area_normal(corners_of(mesh_, face));
+    Vector3 sum{};
+    const auto first = static_cast<std::size_t>(nearest.corners & 1u ? 0 : nearest.corners & 2u ? 1 : 2);
+    for (std::uint32_t t : at_vertices_.at(face[first])) {
+      const Triangle& other = mesh_.triangles[t];
+      const bool holds_all = std::ranges::all_of(std::array<std::size_t, 3>{0, 1, 2}, [&](std::size_t c) {
+        return (nearest.corners >> c & 1u) == 0 || std::ranges::find(other, face[c]) != other.end();
+      });
+      if (holds_all && mesh_.triangle_on_cap[t] == 0)
+        sum = sum + weighted_normal(other, face[first], nearest.corners);
+    }
+    return sum;
+  }
+
+  /// The unit normal of a triangle times its angle at a vertex; times one when the point lies on an edge.
+  Vector3 weighted_normal(const Triangle& triangle, std::uint32_t vertex, unsigned point_corners) const {
+    const auto corners = corners_of(mesh_, triangle);
+    const Vector3 normal = area_normal(corners);
+    const double size = length(normal);
+    if (size == 0) return {};
+    if (point_corners == 3 || point_corners == 5 || point_corners == 6) return (1 / size) * normal;
+    const auto place = static_cast<std::size_t>(std::ranges::find(triangle, vertex) - triangle.begin());
+    const Vector3 one = corners[(place + 1) % 3] - corners[place],
+                  other = corners[(place + 2) % 3] - corners[place];
+    return (std::atan2(size, dot(one, other)) / size) * normal;
+  }
+
+  const Mesh& mesh_;
+  TrianglesAtVertices at_vertices_;
+  TriangleTree tree_;
+};
+
+struct Part {
+  double area = 0, moment = 0;
+  double least = std::numeric_limits<double>::infinity(), most = -std::numeric_limits<double>::infinity();
+};
+
+}  // namespace
+
+Displacement displacement(const Mesh& moved, const Mesh& original, const Progress& report) {
+  std::vector<std::uint32_t> triangles = free_triangles(original);
+  if (triangles.empty()) return {};
+  const std::uint32_t start = triangles.front();
+  const std::vector<double> areas = vertex_areas(moved);
+  const SignedDistance distance(original, std::move(triangles));
+
+  std::vector<Part> parts(moved.positions.size() / kPerChunk + 1);
+  parallel_for(
+      static_cast<std::int64_t>(moved.positions.size()), kPerChunk,
+      [&](std::int64_t begin, std::int64_t end) {
+        Part& part = parts[static_cast<std::size_t>(begin / kPerChunk)];
+        std::uint32_t guess = start;
+        for (auto v = static_cast<std::size_t>(begin); v < static_cast<std::size_t>(end); ++v) {
+          if (areas[v] == 0) continue;
+          const double moved_by = distance(to_double(moved.positions[v]), guess);
+          part.area += areas[v];
+          part.moment += areas[v] * moved_by;
+          part.least = std::min(part.least, moved_by);
+          part.most = std::max(part.most, moved_by);
+        }
+      },
+      report);
+
+  Part all;
+  for (const Part& part : parts) {
+    all = {all.area + part.area, all.moment + part.moment, std::min(all.least, part.least),
+           std::max(all.most, part.most)};
+  }
+  if (all.area == 0) return {};
+  return {all.moment / all.area, all.least, all.most};
+}
+
+}  // namespace volsmooth

@@ -1,0 +1,154 @@
+#include "algorithms/surface/triangle_tree.h"
+
+#include <algorithm>
+#include <bit>
+#include <limits>
+#include <utility>
+
+#include "algorithms/surface/vector_math.h"
+#include "algorithms/volume/parallel.h"
+
+namespace volsmooth {
+namespace {
+
+constexpr std::size_t kLeafSize = 4;
+constexpr std::int64_t kPerChunk = 1 << 14;
+
+/// Every third bit of the result is a bit of `coordinate`, which has 20.
+std::uint64_t spread(std::uint64_t coordinate) {
+  std::uint64_t bits = coordinate & 0xfffff;
+  bits = (bits | bits << 32) & 0x001f00000000ffff;
+  bits = (bits | bits << 16) & 0x001f0000ff0000ff;
+  bits = (bits | bits << 8) & 0x100f00f00f00f00f;
+  bits = (bits | bits << 4) & 0x10c30c30c30c30c3;
+  return (bits | bits << 2) & 0x1249249249249249;
+}
+
+/// Sorts triangles along a Morton curve through their first corners, so that neighbours in the list are near.
+void sort_by_place(const Mesh& mesh, std::vector<std::uint32_t>& triangles) {
+  Float3 low = mesh.positions.front(), high = low;
+  for (const Float3& position : mesh.positions) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      low[axis] = std::min(low[axis], position[axis]);
+      high[axis] = std::max(high[axis], position[axis]);
+    }
+  }
+  const float extent =
+      std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2], std::numeric_limits<float>::min()});
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> keyed(triangles.size());
+  std::ranges::transform(triangles, keyed.begin(), [&](std::uint32_t triangle) {
+    const Float3& corner = mesh.positions[mesh.triangles[triangle][0]];
+    std::uint64_t key = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto place = static_cast<std::uint64_t>((corner[axis] - low[axis]) / extent * 0xfffff);
+      key |= spread(place) << axis;
+    }
+    return std::pair(key, triangle);
+  });
+  std::ranges::sort(keyed);
+  std::ranges::transform(keyed, triangles.begin(), [](const auto& pair) { return pair.second; });
+}
+
+}  // namespace
+
+NearestPoint nearest_point(const Mesh& mesh, std::uint32_t triangle, const Vector3& from) {
+  const auto [a, b, c] = corners_of(mesh, mesh.triangles[triangle]);
+  const auto found = [&](const Vector3& point, unsigned corners) {
+    const Vector3 difference = from - point;
+    return NearestPoint{dot(difference, difference), triangle, point, corners};
+  };
+  const Vector3 ab = b - a, ac = c - a;
+  const double a1 = dot(ab, from - a), a2 = dot(ac, from - a);
+  if (a1 <= 0 && a2 <= 0) return found(a, 1);
+  const double b1 = dot(ab, from - b), b2 = dot(ac, from - b);
+  if (b1 >= 0 && b2 <= b1) return found(b, 2);
+  const double part_c = a1 * b2 - b1 * a2;
+  if (part_c <= 0 && a1 >= 0 && b1 <= 0) return found(a + (a1 / (a1 - b1)) * ab, 1 | 2);
+  const double c1 = dot(ab, from - c), c2 = dot(ac, from - c);
+  if (c2 >= 0 && c1 <= c2) return found(c, 4);
+  const double part_b = c1 * a2 - a1 * c2;
+  if (part_b <= 0 && a2 >= 0 && c2 <= 0) return found(a + (a2 / (a2 - c2)) * ac, 1 | 4);
+  const double part_a = b1 * c2 - c1 * b2;
+  if (part_a <= 0 && b2 >= b1 && c1 >= c2) {
+    return found(b + ((b2 - b1) / ((b2 - b1) + (c1 - c2))) * (c - b), 2 | 4);
+  }
+  const double sum = part_a + part_b + part_c;
+  return found(a + (part_b / sum) * ab + (part_c / sum) * ac, 1 | 2 | 4);
+}
+
+double TriangleTree::Box::squared_distance(const Vector3& from) const {
+  double sum = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double beyond = std::max({low[axis] - from[axis], from[axis] - high[axis], 0.0});
+    sum += beyond * beyond;
+  }
+  return sum;
+}
+
+TriangleTree::TriangleTree(const Mesh& mesh, std::vector<std::uint32_t> chosen)
+    : mesh_(mesh),
+      triangles_(std::move(chosen)),
+      leaves_(std::bit_ceil((triangles_.size() + kLeafSize - 1) / kLeafSize)),
+      boxes_(2 * leaves_) {
+  sort_by_place(mesh_, triangles_);
+  parallel_for(static_cast<std::int64_t>(leaves_), kPerChunk, [&](std::int64_t begin, std::int64_t end) {
+    for (auto leaf = static_cast<std::size_t>(begin); leaf < static_cast<std::size_t>(end); ++leaf) {
+      boxes_[leaves_ + leaf] = box_of_leaf(leaf);
+    }
+  });
+  for (std::size_t node = leaves_ - 1; node > 0; --node) {
+    const Box &left = boxes_[2 * node], &right = boxes_[2 * node + 1];
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      boxes_[node].low[axis] = std::min(left.low[axis], right.low[axis]);
+      boxes_[node].high[axis] = std::max(left.high[axis], right.high[axis]);
+    }
+  }
+}
+
+/// Leaves beyond the last triangle are infinitely far from everything.
+TriangleTree::Box TriangleTree::box_of_leaf(std::size_t leaf) const {
+  constexpr float kFar = std::numeric_limits<float>::infinity();
+  Box box{{kFar, kFar, kFar}, {-kFar, -kFar, -kFar}};
+  const std::size_t end = std::min(triangles_.size(), (leaf + 1) * kLeafSize);
+  for (std::size_t t = leaf * kLeafSize; t < end; ++t) {
+    for (std::uint32_t vertex : mesh_.triangles[triangles_[t]]) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        box.low[axis] = std::min(box.low[axis], mesh_.positions[vertex][axis]);
+        box.high[axis] = std::max(box.high[axis], mesh_.positions[vertex][axis]);
+      }
+    }
+  }
+  return box;
+}
+
+NearestPoint TriangleTree::nearest(const Vector3& from, std::uint32_t guess) const {
+  struct Waiting {
+    std::size_t node;
+    double squared_distance;
+  };
+  std::array<Waiting, 64> stack;  // at most one node a level waits
+  std::size_t waiting = 0;
+  NearestPoint best = nearest_point(mesh_, guess, from);
+  stack[waiting++] = {1, boxes_[1].squared_distance(from)};
+  while (waiting > 0) {
+    const auto [node, squared_distance] = stack[--waiting];
+    if (squared_distance >= best.squared_distance) continue;
+    if (node < leaves_) {
+      Waiting near{2 * node, boxes_[2 * node].squared_distance(from)};
+      Waiting far{2 * node + 1, boxes_[2 * node + 1].squared_distance(from)};
+      if (far.squared_distance < near.squared_distance) std::swap(near, far);
+      stack[waiting++] = far;
+      stack[waiting++] = near;
+      continue;
+    }
+    const std::size_t leaf = node - leaves_;
+    const std::size_t end = std::min(triangles_.size(), (leaf + 1) * kLeafSize);
+    for (std::size_t t = leaf * kLeafSize; t < end; ++t) {
+      const NearestPoint found = nearest_point(mesh_, triangles_[t], from);
+      if (found.squared_distance < best.squared_distance) best = found;
+    }
+  }
+  return best;
+}
+
+}  // namespace volsmooth

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "algorithms/surface/mesh.h"
+
+namespace volsmooth {
+
+/// The triangles round every vertex of a mesh, in ascending order.
+class TrianglesAtVertices {
+ public:
+  explicit TrianglesAtVertices(const Mesh& mesh);
+
+  std::span<const std::uint32_t> at(std::size_t vertex) const {
+    return {triangles_.data() + first_[vertex], triangles_.data() + first_[vertex + 1]};
+  }
+
+ private:
+  std::vector<std::size_t> first_;
+  std::vector<std::uint32_t> triangles_;
+};
+
+}  // namespace volsmooth
