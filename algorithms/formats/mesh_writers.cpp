@@ -1,0 +1,33 @@
+#include "algorithms/formats/mesh_writers.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+
+#include "algorithms/formats/mesh_files.h"
+
+namespace volsmooth {
+
+const std::vector<MeshFormat>& mesh_formats() {
+  static const std::vector<MeshFormat> formats{
+      {"stl", "model/stl", "STL, binary: triangles for printing and planning", false, write_stl},
+      {"ply", "model/ply", "PLY, binary: vertices with normals", false, write_ply},
+      {"obj", "model/obj", "Wavefront OBJ, text: vertices with normals", false, write_obj},
+      {"glb", "model/gltf-binary",
+       "glTF 2.0, binary: all surfaces of a method in one scene, a named node each", true, write_glb},
+  };
+  return formats;
+}
+
+const MeshFormat* find_mesh_format(std::string_view name) {
+  const auto found = std::ranges::find(mesh_formats(), name, &MeshFormat::name);
+  return found == mesh_formats().end() ? nullptr : &*found;
+}
+
+std::string isovalue_text(double isovalue) {
+  std::array<char, 32> digits;
+  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), isovalue + 0.0).ptr;
+  return {digits.data(), end};
+}
+
+}  // namespace volsmooth
