@@ -1,9 +1,63 @@
 #include "algorithms/flows/explicit_steps.h"
 
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "algorithms/volume/parallel.h"
+
 namespace volsmooth {
+namespace {
+
+constexpr std::int64_t kChunk = 1 << 18;
+
+/// A pass over all voxels that moves no progress but can be cancelled.
+void for_each_chunk(std::span<float> voxels, const std::function<void(std::span<float>)>& body,
+                    const Progress& report, double fraction) {
+  parallel_for(
+      static_cast<std::int64_t>(voxels.size()), kChunk,
+      [&](std::int64_t begin, std::int64_t end) {
+        body(voxels.subspan(static_cast<std::size_t>(begin), static_cast<std::size_t>(end - begin)));
+      },
+      [&](double) { report(fraction); });
+}
+
+float largest_magnitude(std::span<float> voxels, const Progress& report) {
+  std::vector<float> largest(voxels.size() / kChunk + 1, 0.0F);
+  for_each_chunk(
+      voxels,
+      [&](std::span<float> chunk) {
+        float& found = largest[static_cast<std::size_t>(chunk.data() - voxels.data()) / kChunk];
+        for (const float value : chunk) found = std::max(found, std::abs(value));
+      },
+      report, 0);
+  return *std::ranges::max_element(largest);
+}
+
+/// The power of two to multiply a volume with so that squares of its differences neither overflow nor vanish
+/// in float. 1 for all but absurd units. Every flow commutes with it, to the last bit.
+float safe_scale(float largest) {
+  constexpr float kLeast = 0x1p-20F, kMost = 0x1p60F;
+  if (largest == 0 || (largest >= kLeast && largest <= kMost)) return 1;
+  return std::ldexp(1.0F, std::clamp(-std::ilogb(largest), -126, 126));
+}
+
+void scale(std::span<float> voxels, float factor, const Progress& report, double fraction) {
+  if (factor == 1) return;
+  for_each_chunk(
+      voxels,
+      [&](std::span<float> chunk) {
+        for (float& value : chunk) value *= factor;
+      },
+      report, fraction);
+}
+
+}  // namespace
 
 void take_steps(Volume& volume, std::int64_t steps, const ExplicitStep& step, const Progress& report) {
   const std::size_t count = voxels_of(volume).size();
+  const float factor = safe_scale(largest_magnitude(voxels_of(volume), report));
+  scale(voxels_of(volume), factor, report, 0);
   auto next = Volume::PixelContainer::New();
   next->Reserve(count);
   for (std::int64_t taken = 0; taken < steps; ++taken) {
@@ -14,6 +68,7 @@ void take_steps(Volume& volume, std::int64_t steps, const ExplicitStep& step, co
     volume.SetPixelContainer(next);
     next = last;
   }
+  scale(voxels_of(volume), 1 / factor, report, 1);
 }
 
 }  // namespace volsmooth

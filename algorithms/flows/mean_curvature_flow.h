@@ -16,8 +16,9 @@ struct MeanCurvatureFlow {
 StepPlan plan(const MeanCurvatureFlow& flow, const Vector3& spacing_mm);
 
 /// Lets all isosurfaces of `volume` flow, on all cores of the current arena. No value leaves the input's
-/// range; the result does not depend on the number of threads. When `report` throws, `volume` holds a state
-/// between two steps or part of one.
+/// range; the result does not depend on the number of threads. The volume's buffer may be another one
+/// afterwards: spans into it taken before are stale. When `report` throws, the intensities are left
+/// undefined.
 void smooth(Volume& volume, const MeanCurvatureFlow& flow, const Progress& report = no_progress);
 
 }  // namespace volsmooth
