@@ -119,8 +119,8 @@ class JobRun {
 
     clock_.run("write", kWriteCost * voxels_, [&](const Progress& progress) {
       foliation.written = write_volume(name, *volume, progress);
-      write_picture(new_result(name + ".png", "picture", name, "image/png"), *original_, *volume,
-                    description_.map, isovalues_);
+      write_picture(new_result(name + ".png", "picture", name, "image/png"), original_slices_,
+                    middle_slices(*volume, description_.map), isovalues_);
     });
 
     const std::vector<Mesh> surfaces = surfaces_of(*volume);
