@@ -1,0 +1,24 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "client/failure.h"
+
+namespace volsmooth {
+
+inline constexpr std::string_view kDefaultServer = "http://127.0.0.1:8742";
+
+/// Where a daemon listens.
+struct ServerAddress {
+  std::string url;          ///< without a slash at the end; "http://localhost" for a Unix socket
+  std::string socket_path;  ///< empty: TCP
+  std::string as_written;   ///< for messages, without a password
+
+  bool is_local() const;  ///< never through a proxy
+};
+
+/// Reads "http://host:port", "https://host:port", "unix:/path", "http+unix:///path" or "http+unix://%2Fpath".
+Expected<ServerAddress> parse_server(std::string_view text);
+
+}  // namespace volsmooth

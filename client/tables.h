@@ -1,0 +1,17 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+namespace volsmooth {
+
+/// Rows of equal length in aligned columns, a line each; what a terminal would obey is made harmless.
+std::string table_text(const std::vector<std::vector<std::string>>& rows);
+
+std::string volumes_text(const nlohmann::json& document);  ///< of GET /v1/volumes
+std::string jobs_text(const nlohmann::json& document);     ///< of GET /v1/jobs
+std::string job_text(const nlohmann::json& job);
+std::string volume_text(const nlohmann::json& volume);
+
+}  // namespace volsmooth
