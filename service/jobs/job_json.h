@@ -12,8 +12,11 @@ nlohmann::json to_json(const StoredVolume& volume);
 nlohmann::json to_json(const Job& job);
 nlohmann::json to_json(const Result& result);
 nlohmann::json to_json(const JobOrder& order);
+nlohmann::json to_json(const JobProgress& progress);
 nlohmann::json to_json(const ParameterValues& parameters);
 nlohmann::json to_json(const MethodInfo& method);
+/// `type`, `detail` and the problem's own members; title and status are HTTP's to add.
+nlohmann::json to_json(const Problem& problem);
 std::string rfc3339(Time time);
 
 /// Reads an order: every member checked, unknown ones refused (unknown-field), wrong ones by name with what

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "service/jobs/job_store.h"
+#include "service/jobs/running_jobs.h"
+
+namespace volsmooth {
+
+/// A job that is this thread's to run. Exactly one of `succeed`, `fail` and `end_interrupted` must be called;
+/// a job that goes out of scope without is failed as `internal`.
+class ClaimedJob {
+ public:
+  /// `settle` makes the change in the store and tells those who listen; false: somebody else was first.
+  using Settle = std::function<bool(const JobChange& change)>;
+
+  ClaimedJob(Job job, EventCounter& numbers, RunningJobs& running_jobs, Settle settle);
+  ClaimedJob(const ClaimedJob&) = delete;
+  ClaimedJob& operator=(const ClaimedJob&) = delete;
+  ~ClaimedJob();
+
+  const Job& job() const { return job_; }
+  RunningJob& running() const { return *running_; }
+
+  bool succeed(
+      std::vector<Result> results);  ///< false: the results must not be seen, the caller removes them
+  void fail(Problem problem);
+  void end_interrupted();  ///< cancelled if somebody asked for that, else queued again
+
+ private:
+  bool settle_as(JobState to, JobProgress progress, std::optional<Problem> error,
+                 std::vector<Result> results);
+
+  const Job job_;
+  RunningJobs& running_jobs_;
+  const std::shared_ptr<RunningJob> running_;
+  const Settle settle_;
+  bool settled_ = false;
+};
+
+}  // namespace volsmooth

@@ -1,0 +1,238 @@
+#include "service/jobs/job_service.h"
+
+#include <algorithm>
+#include <charconv>
+
+#include "service/jobs/ids.h"
+#include "service/jobs/service_state.h"
+
+namespace volsmooth {
+namespace {
+
+/// Kept free on the disk for the database and the results of accepted jobs.
+constexpr std::int64_t kReservedDiskBytes = std::int64_t{64} << 20;
+
+std::optional<std::int64_t> sequence_from(std::string_view cursor) {
+  std::int64_t sequence = 0;
+  const auto [end, error] = std::from_chars(cursor.data(), cursor.data() + cursor.size(), sequence);
+  if (error != std::errc() || end != cursor.data() + cursor.size()) return std::nullopt;
+  return sequence;
+}
+
+tl::unexpected<Problem> too_large(std::int64_t limit_bytes) {
+  return refuse("content-too-large", "An upload may hold at most " + std::to_string(limit_bytes) + " bytes.",
+                {{"limit_bytes", limit_bytes}});
+}
+
+}  // namespace
+
+JobService::JobService(JobServiceSettings settings, Engine engine)
+    : state_(std::make_unique<State>(std::move(settings), std::move(engine))) {}
+
+JobService::~JobService() {
+  stop();
+}
+
+void JobService::start() {
+  state_->started = true;
+  state_->pool.start();
+}
+
+void JobService::stop() {
+  state_->stopping = true;
+  state_->running.interrupt_all(RunningJob::Interruption::kStop);
+  state_->pool.stop();
+}
+
+const Engine& JobService::engine() const {
+  return state_->engine;
+}
+
+tl::expected<IncomingFile, Problem> JobService::begin_upload(std::optional<std::int64_t> declared_bytes) {
+  const std::int64_t bytes = declared_bytes.value_or(0);
+  const std::int64_t free = state_->files.free_bytes() - kReservedDiskBytes;
+  if (bytes > state_->settings.max_upload_bytes) return too_large(state_->settings.max_upload_bytes);
+  if (bytes > free)
+    return refuse("insufficient-storage", "The disk has too little free space for this upload.",
+                  {{"free_bytes", std::max<std::int64_t>(free, 0)}});
+  return state_->files.receive();
+}
+
+tl::expected<StoredVolume, Problem> JobService::keep_volume(IncomingFile file, const UploadOptions& options) {
+  if (file.bytes() > state_->settings.max_upload_bytes) return too_large(state_->settings.max_upload_bytes);
+  StoredVolume volume;
+  volume.sha256 = file.finish();
+  auto facts = state_->engine.inspect(file.path(), options);
+  if (!facts) return tl::unexpected(std::move(facts.error()));
+  volume.id = new_id("v-");
+  volume.options = options;
+  volume.facts = *std::move(facts);
+  volume.bytes = file.bytes();
+  volume.created_at = now_in_milliseconds();
+
+  state_->files.adopt(std::move(file), volume_file(volume.id));
+  try {
+    state_->volumes.insert(volume);
+  } catch (...) {
+    // If nobody knows whether the row is there, the next start sees, and sweeps the file if not.
+    if (!state_->database.condemned()) state_->files.remove(volume_file(volume.id));
+    throw;
+  }
+  return volume;
+}
+
+std::vector<StoredVolume> JobService::volumes() {
+  return state_->volumes.all();
+}
+
+tl::expected<StoredVolume, Problem> JobService::volume(std::string_view id) {
+  if (auto found = state_->volumes.find(id)) return *std::move(found);
+  return state_->missing(id, "volume");
+}
+
+tl::expected<StoredFile, Problem> JobService::volume_content(std::string_view id) {
+  auto found = volume(id);
+  if (!found) return tl::unexpected(std::move(found.error()));
+  return state_->stored_file(volume_file(id), "application/octet-stream", found->bytes, found->sha256);
+}
+
+tl::expected<void, Problem> JobService::delete_volume(std::string_view id) {
+  switch (state_->volumes.remove(id)) {
+    case VolumeStore::Removal::kDone:
+      state_->files.remove(volume_file(id));
+      return {};
+    case VolumeStore::Removal::kInUse:
+      return refuse("volume-in-use",
+                    "A job that is not finished needs this volume; cancel it or wait for it.");
+    case VolumeStore::Removal::kUnknown:
+      break;
+  }
+  return state_->unless_gone(id, "volume");
+}
+
+tl::expected<Job, Problem> JobService::submit(const JobOrder& order) {
+  if (auto checked = state_->check(order); !checked) return tl::unexpected(std::move(checked.error()));
+  const auto no_volume = [] {
+    return refuse("not-found", "There is no such volume.", {{"member", "volume"}});
+  };
+  const auto volume = state_->volumes.find(order.volume);
+  if (!volume) return no_volume();
+  auto plan = state_->engine.plan(order, volume->facts);
+  if (!plan) return tl::unexpected(std::move(plan.error()));
+
+  Job job;
+  job.id = new_id("j-");
+  job.order = order;
+  job.parameters = std::move(plan->parameters);
+  job.memory_bytes = plan->memory_bytes;
+  job.progress.stage = "queued";
+  job.created_at = now_in_milliseconds();
+  switch (state_->jobs.insert(job, state_->settings.max_queued)) {
+    case JobStore::Insertion::kNoVolume:
+      return no_volume();
+    case JobStore::Insertion::kQueueFull:
+      return refuse("queue-full", "Too many jobs are waiting; try again later.",
+                    {{"limit", state_->settings.max_queued}});
+    case JobStore::Insertion::kDone:
+      break;
+  }
+  state_->pool.wake();
+  return job;
+}
+
+tl::expected<Job, Problem> JobService::job(std::string_view id) {
+  if (auto found = state_->jobs.find(id)) return state_->with_progress(*std::move(found));
+  return state_->missing(id, "job");
+}
+
+tl::expected<JobPage, Problem> JobService::jobs(const JobQuery& query) {
+  std::optional<std::int64_t> before;
+  if (!query.cursor.empty()) {
+    before = sequence_from(query.cursor);
+    if (!before) return refuse("bad-query", "'cursor' must be the next_cursor of the page before.");
+  }
+  auto listed = state_->jobs.list(query, before);
+  JobPage page;
+  if (std::ssize(listed) > query.limit) {
+    listed.resize(static_cast<std::size_t>(query.limit));
+    if (!listed.empty()) page.next_cursor = std::to_string(listed.back().sequence);
+  }
+  for (auto& [job, sequence] : listed) page.jobs.push_back(state_->with_progress(std::move(job)));
+  return page;
+}
+
+tl::expected<Job, Problem> JobService::cancel(std::string_view id) {
+  // Repeated when the job moves on between the look and the step; it can do so only a few times.
+  while (const auto found = state_->jobs.find(id)) {
+    bool stepped = is_final(found->state);
+    if (found->state == JobState::kQueued) {
+      stepped = state_->settle(
+          {found->id, found->attempt, JobState::kQueued, JobState::kCancelled, found->progress});
+    } else if (found->state == JobState::kRunning) {
+      stepped = state_->jobs.request_cancel(id);
+      if (const auto running = state_->running.find(id))
+        running->interrupt(RunningJob::Interruption::kCancel);
+    }
+    if (stepped) return job(id);
+  }
+  return state_->missing(id, "job");
+}
+
+tl::expected<void, Problem> JobService::delete_job(std::string_view id) {
+  const auto removed = state_->jobs.remove(id);
+  if (!removed) return state_->unless_gone(id, "job");
+  if (const auto running = state_->running.find(id)) running->interrupt(RunningJob::Interruption::kCancel);
+  if (removed->job.state == JobState::kSucceeded) state_->files.remove(results_directory(removed->job));
+  if (!removed->was_final) state_->tell_final(removed->job);
+  state_->wakes.wake(removed->job.id);
+  return {};
+}
+
+tl::expected<StoredFile, Problem> JobService::result(std::string_view job_id, std::string_view name) {
+  const auto found = state_->jobs.find(job_id);
+  if (!found) return state_->missing(job_id, "job");
+  const auto result = std::ranges::find(found->results, name, &Result::name);
+  if (result == found->results.end()) return refuse("not-found", "The job has no result of that name.");
+  return state_->stored_file(results_directory(*found) + "/" + result->name, result->media_type,
+                             result->bytes, result->sha256);
+}
+
+tl::expected<std::vector<JobEvent>, Problem> JobService::events_after(std::string_view job_id,
+                                                                      std::string_view last_event_id) {
+  const EventNumber after = event_number_from(last_event_id).value_or(EventNumber{});
+  // Memory first: when the attempt ends in between, the store has all of its events, so none is missed.
+  std::map<EventNumber, JobEvent> events;
+  if (const auto running = state_->running.find(job_id))
+    for (const NumberedEvent& event : running->events())
+      if (event.number > after) events.emplace(event.number, outside_view(event));
+  if (!state_->jobs.find(job_id)) return state_->missing(job_id, "job");
+  for (const NumberedEvent& event : state_->jobs.events_after(job_id, after))
+    events.emplace(event.number, outside_view(event));
+
+  std::vector<JobEvent> ordered;
+  for (auto& [number, event] : events) ordered.push_back(std::move(event));
+  return ordered;
+}
+
+JobService::Subscription JobService::subscribe(std::string_view job_id, std::function<void()> wake) {
+  return state_->wakes.add(job_id, std::move(wake));
+}
+
+void JobService::on_final(std::function<void(const Job&)> observer) {
+  state_->observer = std::move(observer);
+}
+
+ServiceStatistics JobService::statistics() {
+  ServiceStatistics found = state_->jobs.statistics();
+  found.free_disk_bytes = state_->files.free_bytes();
+  return found;
+}
+
+std::optional<std::string> JobService::not_ready_because() {
+  if (state_->database.condemned()) return "a commit failed; restart the daemon to recover";
+  if (!state_->started) return "starting";
+  if (state_->stopping) return "stopping";
+  return std::nullopt;
+}
+
+}  // namespace volsmooth

@@ -1,0 +1,268 @@
+#include "service/jobs/job_store.h"
+
+#include <stdexcept>
+
+#include "service/jobs/job_json.h"
+#include "service/jobs/stored_json.h"
+
+namespace volsmooth {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::string_view kSelectJob =
+    "SELECT sequence, id, state, job_order, parameters, memory_bytes, created_ms, started_ms, finished_ms, "
+    "attempt, stage, fraction, error, deaths, cancel_requested FROM jobs ";
+
+std::optional<Time> time_or_none(const Statement& row, int column) {
+  if (row.is_null(column)) return std::nullopt;
+  return time_of(row.integer(column));
+}
+
+Result result_from(const Statement& row) {
+  Result result;
+  result.name = row.text(0);
+  result.kind = row.text(1);
+  result.method = row.text(2);
+  result.isovalues = json::parse(row.text(3)).get<std::vector<double>>();
+  result.many_surfaces = row.integer(4) != 0;
+  result.frame = row.text(5);
+  result.media_type = row.text(6);
+  result.bytes = row.integer(7);
+  result.sha256 = row.text(8);
+  return result;
+}
+
+std::vector<Result> results_of(Database& database, std::int64_t sequence) {
+  Statement row = database.query(
+      "SELECT name, kind, method, isovalues, many_surfaces, frame, media_type, bytes, sha256 FROM results "
+      "WHERE job = ? ORDER BY position",
+      sequence);
+  std::vector<Result> results;
+  while (row.step()) results.push_back(result_from(row));
+  return results;
+}
+
+JobStore::Listed job_from(Database& database, const Statement& row) {
+  Job job;
+  const std::int64_t sequence = row.integer(0);
+  job.id = row.text(1);
+  job.state = job_state_from(row.text(2)).value();
+  job.order = order_from_stored_json(json::parse(row.text(3)));
+  job.parameters = parameters_from_json(json::parse(row.text(4)));
+  job.memory_bytes = row.integer(5);
+  job.created_at = time_of(row.integer(6));
+  job.started_at = time_or_none(row, 7);
+  job.finished_at = time_or_none(row, 8);
+  job.attempt = static_cast<int>(row.integer(9));
+  job.progress = {row.text(10), row.real(11), std::nullopt};
+  if (!row.is_null(12)) job.error = problem_from_stored_json(json::parse(row.text(12)));
+  if (job.state == JobState::kSucceeded) job.results = results_of(database, sequence);
+  return {std::move(job), sequence};
+}
+
+std::optional<Job> find_in(Database& database, std::string_view id) {
+  Statement row = database.query(std::string(kSelectJob) + "WHERE id = ?", id);
+  if (!row.step()) return std::nullopt;
+  return job_from(database, row).job;
+}
+
+void insert_event(Database& database, std::string_view job_id, const NumberedEvent& event) {
+  database.run(
+      "INSERT INTO events (job, start, number, kind, data) "
+      "SELECT sequence, ?2, ?3, ?4, ?5 FROM jobs WHERE id = ?1",
+      job_id, event.number.start, event.number.number, event.kind, event.data);
+}
+
+void insert_results(Database& database, std::string_view job_id, const std::vector<Result>& results) {
+  for (std::size_t position = 0; position < results.size(); ++position) {
+    const Result& result = results[position];
+    database.run(
+        "INSERT INTO results (job, position, name, kind, method, isovalues, many_surfaces, frame, "
+        "media_type, "
+        "bytes, sha256) SELECT sequence, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11 FROM jobs WHERE id = ?1",
+        job_id, position, result.name, result.kind, result.method, json(result.isovalues).dump(),
+        result.many_surfaces, result.frame, result.media_type, result.bytes, result.sha256);
+  }
+}
+
+std::int64_t count(Database& database, std::string_view sql) {
+  Statement row = database.query(sql);
+  row.step();
+  return row.integer(0);
+}
+
+std::string results_directory(std::string_view job_id, std::int64_t attempt) {
+  return "results/" + std::string(job_id) + "." + std::to_string(attempt);
+}
+
+constexpr std::string_view kCountQueued = "SELECT count(*) FROM jobs WHERE state = 'queued'";
+
+}  // namespace
+
+JobStore::Insertion JobStore::insert(const Job& job, int max_queued) {
+  return database_.write([&](Database& database) {
+    if (count(database, kCountQueued) >= max_queued) return Insertion::kQueueFull;
+    const int inserted = database.run(
+        "INSERT INTO jobs (id, volume, method, label, state, job_order, parameters, memory_bytes, "
+        "created_ms, stage) "
+        "SELECT ?1, id, ?3, ?4, 'queued', ?5, ?6, ?7, ?8, 'queued' FROM volumes WHERE id = ?2",
+        job.id, job.order.volume, job.order.method, job.order.label, to_json(job.order).dump(),
+        to_json(job.parameters).dump(), job.memory_bytes, milliseconds_of(job.created_at));
+    if (inserted == 0) return Insertion::kNoVolume;
+    insert_event(database, job.id,
+                 {events_.next(), "state", state_event_data(job.id, JobState::kQueued, {}, {})});
+    audit(database, job.id, "job queued");
+    return Insertion::kDone;
+  });
+}
+
+std::optional<Job> JobStore::find(std::string_view id) {
+  return database_.read([&](Database& database) { return find_in(database, id); });
+}
+
+std::vector<JobStore::Listed> JobStore::list(const JobQuery& query, std::optional<std::int64_t> before) {
+  return database_.read([&](Database& database) {
+    std::optional<std::string_view> state;
+    if (query.state) state = name_of(*query.state);
+    // A condition whose value is absent holds for every row.
+    Statement row = database.query(
+        std::string(kSelectJob) +
+            "WHERE (?1 IS NULL OR state = ?1) AND (?2 = '' OR method = ?2) AND (?3 = '' OR label = ?3) "
+            "AND (?4 IS NULL OR sequence < ?4) ORDER BY sequence DESC LIMIT ?5",
+        state, query.method, query.label, before, query.limit + 1);
+    std::vector<Listed> jobs;
+    while (row.step()) jobs.push_back(job_from(database, row));
+    return jobs;
+  });
+}
+
+std::optional<Job> JobStore::claim(std::int64_t most_memory_bytes) {
+  if (!database_.read([&](Database& database) { return count(database, kCountQueued); })) return std::nullopt;
+  return database_.write([&](Database& database) -> std::optional<Job> {
+    Statement head = database.query(
+        "SELECT id, attempt FROM jobs WHERE memory_bytes <= ? AND sequence = "
+        "(SELECT min(sequence) FROM jobs WHERE state = 'queued')",
+        most_memory_bytes);
+    if (!head.step()) return std::nullopt;
+    JobChange claimed{head.text(0), static_cast<int>(head.integer(1)), JobState::kQueued, JobState::kRunning,
+                      JobProgress{"read", 0, std::nullopt}};
+    change_in(database, claimed);
+    return find_in(database, claimed.id);
+  });
+}
+
+bool JobStore::change(const JobChange& change) {
+  return database_.write([&](Database& database) { return change_in(database, change); });
+}
+
+bool JobStore::change_in(Database& database, const JobChange& change) {
+  if (!can_become(change.from, change.to))
+    throw std::logic_error("a job cannot become " + std::string(name_of(change.to)) + " from " +
+                           std::string(name_of(change.from)));
+  const Time now = now_in_milliseconds();
+  const std::optional<Time> finished = is_final(change.to) ? std::optional(now) : std::nullopt;
+  std::optional<std::int64_t> started_ms, finished_ms;
+  if (change.to == JobState::kRunning) started_ms = milliseconds_of(now);
+  if (finished) finished_ms = milliseconds_of(now);
+  std::optional<std::string> error;
+  if (change.error) error = problem_to_stored_json(*change.error).dump();
+
+  const int changed = database.run(
+      "UPDATE jobs SET state = ?4, attempt = attempt + (?4 = 'running'), deaths = deaths + ?5, "
+      "started_ms = CASE ?4 WHEN 'running' THEN ?6 WHEN 'queued' THEN NULL ELSE started_ms END, "
+      "finished_ms = ?7, stage = ?8, fraction = ?9, error = ?10 "
+      "WHERE id = ?1 AND attempt = ?2 AND state = ?3 AND (cancel_requested = 0 OR ?4 = 'cancelled')",
+      change.id, change.attempt, name_of(change.from), name_of(change.to), change.deaths, started_ms,
+      finished_ms, change.progress.stage, change.progress.fraction, error);
+  if (changed == 0) return false;
+
+  for (const NumberedEvent& event : change.progress_events) insert_event(database, change.id, event);
+  insert_event(database, change.id,
+               {events_.next(), "state", state_event_data(change.id, change.to, finished, change.error)});
+  insert_results(database, change.id, change.results);
+  audit(database, change.id, "job " + std::string(name_of(change.to)));
+  return true;
+}
+
+bool JobStore::request_cancel(std::string_view id) {
+  return database_.write([&](Database& database) {
+    const bool requested =
+        database.run("UPDATE jobs SET cancel_requested = 1 WHERE id = ? AND state = 'running'", id) > 0;
+    if (requested) audit(database, id, "job cancel requested");
+    return requested;
+  });
+}
+
+bool JobStore::is_wanted(std::string_view id) {
+  return database_.read([&](Database& database) {
+    return database.query("SELECT 1 FROM jobs WHERE id = ? AND cancel_requested = 0", id).step();
+  });
+}
+
+std::optional<JobStore::Removed> JobStore::remove(std::string_view id) {
+  return database_.write([&](Database& database) -> std::optional<Removed> {
+    std::optional<Job> job = find_in(database, id);
+    if (!job) return std::nullopt;
+    const bool was_final = is_final(job->state);
+    if (!was_final) {
+      change_in(database, {job->id, job->attempt, job->state, JobState::kCancelled, job->progress});
+      job = find_in(database, id);
+    }
+    database.run("DELETE FROM jobs WHERE id = ?", id);
+    bury(database, id);
+    audit(database, id, "job deleted");
+    return Removed{*std::move(job), was_final};
+  });
+}
+
+std::vector<JobStore::Interrupted> JobStore::running() {
+  return database_.read([](Database& database) {
+    Statement row = database.query(std::string(kSelectJob) + "WHERE state = 'running' ORDER BY sequence");
+    std::vector<Interrupted> jobs;
+    while (row.step())
+      jobs.push_back({job_from(database, row).job, static_cast<int>(row.integer(13)), row.integer(14) != 0});
+    return jobs;
+  });
+}
+
+std::set<std::string, std::less<>> JobStore::results_directories() {
+  return database_.read([](Database& database) {
+    Statement row = database.query("SELECT id, attempt FROM jobs WHERE state = 'succeeded'");
+    std::set<std::string, std::less<>> directories;
+    while (row.step()) directories.insert(results_directory(row.text(0), row.integer(1)));
+    return directories;
+  });
+}
+
+std::vector<NumberedEvent> JobStore::events_after(std::string_view id, EventNumber after) {
+  return database_.read([&](Database& database) {
+    Statement row = database.query(
+        "SELECT start, number, kind, data FROM events WHERE job = (SELECT sequence FROM jobs WHERE id = ?1) "
+        "AND (start, number) > (?2, ?3) ORDER BY start, number",
+        id, after.start, after.number);
+    std::vector<NumberedEvent> events;
+    while (row.step()) events.push_back({{row.integer(0), row.integer(1)}, row.text(2), row.text(3)});
+    return events;
+  });
+}
+
+ServiceStatistics JobStore::statistics() {
+  return database_.read([](Database& database) {
+    ServiceStatistics found;
+    found.queued = count(database, kCountQueued);
+    found.running = count(database, "SELECT count(*) FROM jobs WHERE state = 'running'");
+    found.volumes = count(database, "SELECT count(*) FROM volumes");
+    found.jobs_total = count(database, "SELECT count(*) FROM jobs");
+    found.stored_bytes = count(database,
+                               "SELECT (SELECT coalesce(sum(bytes), 0) FROM volumes) + "
+                               "(SELECT coalesce(sum(bytes), 0) FROM results)");
+    return found;
+  });
+}
+
+std::string results_directory(const Job& job) {
+  return results_directory(job.id, job.attempt);
+}
+
+}  // namespace volsmooth

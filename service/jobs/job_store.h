@@ -1,0 +1,83 @@
+#pragma once
+
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "service/jobs/events.h"
+#include "service/jobs/store_database.h"
+
+namespace volsmooth {
+
+/// One step in a job's life and what becomes known with it.
+struct JobChange {
+  std::string id;
+  int attempt = 0;  ///< the fence: the attempt that the caller speaks for
+  JobState from = JobState::kQueued;
+  JobState to = JobState::kQueued;
+  JobProgress progress;
+  std::optional<Problem> error = {};
+  std::vector<Result> results = {};
+  std::vector<NumberedEvent> progress_events = {};  ///< of the attempt that ends
+  int deaths = 0;                                   ///< of the daemon, to be counted against the job
+};
+
+/// Rows of jobs. Every step in a job's life is one conditional UPDATE, with the state and the attempt as the
+/// fence: whoever comes second changes nothing. Thread-safe; throws DatabaseError.
+class JobStore {
+ public:
+  explicit JobStore(StoreDatabase& database) : database_(database), events_(database.start_number()) {}
+
+  EventCounter& event_counter() { return events_; }
+
+  enum class Insertion { kDone, kNoVolume, kQueueFull };
+  Insertion insert(const Job& job, int max_queued);
+
+  std::optional<Job> find(std::string_view id);
+  /// Newest first, at most `query.limit` + 1 of those older than `before` (a sequence number).
+  struct Listed {
+    Job job;
+    std::int64_t sequence;
+  };
+  std::vector<Listed> list(const JobQuery& query, std::optional<std::int64_t> before);
+
+  /// The oldest queued job becomes a running one, provided that it needs no more memory than this.
+  std::optional<Job> claim(std::int64_t most_memory_bytes);
+  /// False: the job is not in that state and attempt any more, or was asked to be cancelled.
+  bool change(const JobChange& change);
+
+  bool request_cancel(std::string_view id);  ///< of a running job; false: it is not running
+  bool is_wanted(std::string_view id);       ///< it is there, and nobody asked to cancel it
+
+  /// Takes the job out, an unfinished one by way of `cancelled`. Gives what it was, and what it is no more.
+  struct Removed {
+    Job job;
+    bool was_final;
+  };
+  std::optional<Removed> remove(std::string_view id);
+
+  struct Interrupted {
+    Job job;
+    int deaths;
+    bool cancel_requested;
+  };
+  std::vector<Interrupted> running();  ///< at the start: those that the last daemon died under
+
+  std::set<std::string, std::less<>> results_directories();  ///< those that a succeeded job points to
+
+  std::vector<NumberedEvent> events_after(std::string_view id, EventNumber after);
+  ServiceStatistics statistics();  ///< all but the free disk space
+
+ private:
+  bool change_in(Database& database, const JobChange& change);
+
+  StoreDatabase& database_;
+  EventCounter events_;
+};
+
+/// Where the results of a job lie below the data directory; each attempt has a place of its own.
+std::string results_directory(const Job& job);
+
+}  // namespace volsmooth

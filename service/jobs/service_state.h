@@ -1,0 +1,62 @@
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <mutex>
+#include <string>
+
+#include "service/jobs/claimed_job.h"
+#include "service/jobs/job_runner.h"
+#include "service/jobs/job_service.h"
+#include "service/jobs/job_store.h"
+#include "service/jobs/running_jobs.h"
+#include "service/jobs/volume_store.h"
+#include "service/jobs/wake_list.h"
+#include "service/jobs/worker_pool.h"
+#include "service/storage/file_store.h"
+
+namespace volsmooth {
+
+/// A refusal, as every answer can be one.
+tl::unexpected<Problem> refuse(std::string slug, std::string detail,
+                               nlohmann::json members = nlohmann::json::object());
+
+/// The parts of the service and what they do together; job_service.cpp adds the answers to the outside.
+struct JobService::State {
+  State(JobServiceSettings given, Engine computing);
+
+  // The start.
+  void recover();
+  void sweep();
+
+  // Running jobs.
+  WorkerPool::Work claim();
+  bool settle(const JobChange& change);
+  void tell_final(const Job& job);
+
+  // Answers.
+  /// Why there is nothing of that id: bad-id, gone or not-found.
+  tl::unexpected<Problem> missing(std::string_view id, std::string_view what);
+  /// The same, but deleted is what it should be.
+  tl::expected<void, Problem> unless_gone(std::string_view id, std::string_view what);
+  Job with_progress(Job job) const;
+  tl::expected<void, Problem> check(const JobOrder& order) const;
+  tl::expected<StoredFile, Problem> stored_file(const std::string& name, const std::string& media_type,
+                                                std::int64_t bytes, const std::string& sha256) const;
+
+  const JobServiceSettings settings;
+  const Engine engine;
+  FileStore files;
+  StoreDatabase database;
+  VolumeStore volumes;
+  JobStore jobs;
+  WakeList wakes;
+  RunningJobs running;
+  JobRunner runner;
+  std::function<void(const Job&)> observer;
+  std::mutex claiming;
+  std::atomic<bool> started = false, stopping = false;
+  WorkerPool pool;  // last: its threads use all of the above
+};
+
+}  // namespace volsmooth

@@ -1,0 +1,135 @@
+#include "service/jobs/store_database.h"
+
+#include <stdexcept>
+
+namespace volsmooth {
+namespace {
+
+constexpr std::int64_t kSchemaVersion = 1;
+
+constexpr const char* kSchema = R"(
+  CREATE TABLE volumes (
+    sequence   INTEGER PRIMARY KEY AUTOINCREMENT,
+    id         TEXT NOT NULL UNIQUE,
+    options    TEXT NOT NULL,
+    facts      TEXT NOT NULL,
+    bytes      INTEGER NOT NULL,
+    sha256     TEXT NOT NULL,
+    created_ms INTEGER NOT NULL
+  ) STRICT;
+
+  CREATE TABLE jobs (
+    sequence         INTEGER PRIMARY KEY AUTOINCREMENT,
+    id               TEXT NOT NULL UNIQUE,
+    volume           TEXT NOT NULL,
+    method           TEXT NOT NULL,
+    label            TEXT NOT NULL,
+    state            TEXT NOT NULL,
+    job_order        TEXT NOT NULL,
+    parameters       TEXT NOT NULL,
+    memory_bytes     INTEGER NOT NULL,
+    created_ms       INTEGER NOT NULL,
+    started_ms       INTEGER,
+    finished_ms      INTEGER,
+    attempt          INTEGER NOT NULL DEFAULT 0,
+    deaths           INTEGER NOT NULL DEFAULT 0,
+    cancel_requested INTEGER NOT NULL DEFAULT 0,
+    stage            TEXT NOT NULL,
+    fraction         REAL NOT NULL DEFAULT 0,
+    error            TEXT
+  ) STRICT;
+  CREATE INDEX unfinished_jobs ON jobs (state, sequence) WHERE state IN ('queued', 'running');
+
+  CREATE TABLE results (
+    job           INTEGER NOT NULL REFERENCES jobs (sequence) ON DELETE CASCADE,
+    position      INTEGER NOT NULL,
+    name          TEXT NOT NULL,
+    kind          TEXT NOT NULL,
+    method        TEXT NOT NULL,
+    isovalues     TEXT NOT NULL,
+    many_surfaces INTEGER NOT NULL,
+    frame         TEXT NOT NULL,
+    media_type    TEXT NOT NULL,
+    bytes         INTEGER NOT NULL,
+    sha256        TEXT NOT NULL,
+    PRIMARY KEY (job, position)
+  ) STRICT, WITHOUT ROWID;
+
+  CREATE TABLE events (
+    job    INTEGER NOT NULL REFERENCES jobs (sequence) ON DELETE CASCADE,
+    start  INTEGER NOT NULL,
+    number INTEGER NOT NULL,
+    kind   TEXT NOT NULL,
+    data   TEXT NOT NULL,
+    PRIMARY KEY (job, start, number)
+  ) STRICT, WITHOUT ROWID;
+
+  CREATE TABLE tombstones (id TEXT PRIMARY KEY, deleted_ms INTEGER NOT NULL) STRICT, WITHOUT ROWID;
+  CREATE TABLE audit (sequence INTEGER PRIMARY KEY AUTOINCREMENT, at_ms INTEGER NOT NULL, subject TEXT NOT NULL,
+                      action TEXT NOT NULL) STRICT;
+  CREATE TABLE starts (number INTEGER PRIMARY KEY AUTOINCREMENT, at_ms INTEGER NOT NULL) STRICT;
+
+  PRAGMA user_version = 1;
+)";
+
+std::int64_t schema_version(Database& database) {
+  Statement version = database.query("PRAGMA user_version");
+  version.step();
+  return version.integer(0);
+}
+
+void check_integrity(Database& database) {
+  Statement check = database.query("PRAGMA quick_check(1)");
+  if (!check.step() || check.text(0) != "ok")
+    throw std::runtime_error("the database is damaged; restore the data directory from a backup");
+}
+
+/// Creates what is missing and counts the start, all in one transaction.
+std::int64_t prepare(Database& database) {
+  check_integrity(database);
+  Transaction transaction(database, Transaction::Kind::kWrite);
+  if (schema_version(database) > kSchemaVersion)
+    throw std::runtime_error("the database was written by a later version of volsmoothd");
+  if (schema_version(database) == 0) database.execute(kSchema);
+  database.run("INSERT INTO starts (at_ms) VALUES (?)", milliseconds_of(now_in_milliseconds()));
+  Statement newest = database.query("SELECT max(number) FROM starts");
+  newest.step();
+  const std::int64_t number = newest.integer(0);
+  transaction.commit();
+  return number;
+}
+
+}  // namespace
+
+StoreDatabase::StoreDatabase(const std::filesystem::path& file)
+    : writer_(file, Database::Access::kWriter),
+      start_number_(prepare(writer_)),
+      reader_(file, Database::Access::kReader) {}
+
+void audit(Database& database, std::string_view subject, std::string_view action) {
+  database.run("INSERT INTO audit (at_ms, subject, action) VALUES (?, ?, ?)",
+               milliseconds_of(now_in_milliseconds()), subject, action);
+}
+
+void bury(Database& database, std::string_view id) {
+  database.run("INSERT INTO tombstones (id, deleted_ms) VALUES (?, ?)", id,
+               milliseconds_of(now_in_milliseconds()));
+}
+
+bool is_buried(Database& database, std::string_view id) {
+  return database.query("SELECT 1 FROM tombstones WHERE id = ?", id).step();
+}
+
+std::int64_t milliseconds_of(Time time) {
+  return std::chrono::floor<std::chrono::milliseconds>(time.time_since_epoch()).count();
+}
+
+Time time_of(std::int64_t milliseconds) {
+  return Time(std::chrono::milliseconds(milliseconds));
+}
+
+Time now_in_milliseconds() {
+  return time_of(milliseconds_of(std::chrono::system_clock::now()));
+}
+
+}  // namespace volsmooth

@@ -1,0 +1,65 @@
+#include "service/jobs/volume_store.h"
+
+#include "service/jobs/stored_json.h"
+
+namespace volsmooth {
+namespace {
+
+StoredVolume volume_from(const Statement& row) {
+  StoredVolume volume;
+  volume.id = row.text(0);
+  volume.options = options_from_json(nlohmann::json::parse(row.text(1)));
+  volume.facts = facts_from_json(nlohmann::json::parse(row.text(2)));
+  volume.bytes = row.integer(3);
+  volume.sha256 = row.text(4);
+  volume.created_at = time_of(row.integer(5));
+  return volume;
+}
+
+}  // namespace
+
+void VolumeStore::insert(const StoredVolume& volume) {
+  database_.write([&](Database& database) {
+    audit(database, volume.id, "volume stored");
+    return database.run(
+        "INSERT INTO volumes (id, options, facts, bytes, sha256, created_ms) VALUES (?, ?, ?, ?, ?, ?)",
+        volume.id, options_to_json(volume.options).dump(), facts_to_json(volume.facts).dump(), volume.bytes,
+        volume.sha256, milliseconds_of(volume.created_at));
+  });
+}
+
+std::optional<StoredVolume> VolumeStore::find(std::string_view id) {
+  return database_.read([&](Database& database) -> std::optional<StoredVolume> {
+    Statement row =
+        database.query("SELECT id, options, facts, bytes, sha256, created_ms FROM volumes WHERE id = ?", id);
+    if (!row.step()) return std::nullopt;
+    return volume_from(row);
+  });
+}
+
+std::vector<StoredVolume> VolumeStore::all() {
+  return database_.read([](Database& database) {
+    Statement row = database.query(
+        "SELECT id, options, facts, bytes, sha256, created_ms FROM volumes ORDER BY sequence DESC");
+    std::vector<StoredVolume> volumes;
+    while (row.step()) volumes.push_back(volume_from(row));
+    return volumes;
+  });
+}
+
+VolumeStore::Removal VolumeStore::remove(std::string_view id) {
+  return database_.write([&](Database& database) {
+    const int removed = database.run(
+        "DELETE FROM volumes WHERE id = ?1 AND NOT EXISTS "
+        "(SELECT 1 FROM jobs WHERE volume = ?1 AND state IN ('queued', 'running'))",
+        id);
+    if (removed == 0)
+      return database.query("SELECT 1 FROM volumes WHERE id = ?", id).step() ? Removal::kInUse
+                                                                             : Removal::kUnknown;
+    bury(database, id);
+    audit(database, id, "volume deleted");
+    return Removal::kDone;
+  });
+}
+
+}  // namespace volsmooth
