@@ -4,6 +4,7 @@
 #include <map>
 #include <string>
 #include <string_view>
+#include <tl/expected.hpp>
 
 namespace volsmooth {
 
@@ -16,5 +17,9 @@ struct Refusal {
   std::map<std::string, double> numbers =
       {};  ///< members of the problem document, such as the number of bad voxels
 };
+
+inline tl::unexpected<Refusal> refuse(std::string slug, std::string detail) {
+  return tl::unexpected(Refusal{std::move(slug), std::move(detail)});
+}
 
 }  // namespace volsmooth

@@ -1,0 +1,41 @@
+#include "algorithms/formats/voxel_warnings.h"
+
+namespace volsmooth {
+namespace {
+
+constexpr std::int64_t kMostLabels = 32;
+constexpr double kPaddingShare = 0.01;  ///< of the voxels at the minimum ...
+constexpr double kPaddingGap = 0.05;    ///< ... which lies this much of the remaining range below all others
+
+bool looks_like_labels(const VoxelType& type, const VoxelStatistics& statistics) {
+  return type.is_integer && statistics.distinct() <= kMostLabels;
+}
+
+/// Scanners fill what they did not see with a negative value far below air, such as -2000 or -3024.
+bool looks_padded(const VoxelStatistics& statistics) {
+  const double gap = static_cast<double>(statistics.second_lowest()) - statistics.minimum();
+  const double range = static_cast<double>(statistics.maximum()) - statistics.second_lowest();
+  return statistics.minimum() < 0 && statistics.distinct() > kMostLabels && gap >= kPaddingGap * range &&
+         static_cast<double>(statistics.at_minimum()) >=
+             kPaddingShare * static_cast<double>(statistics.count());
+}
+
+}  // namespace
+
+void warn_of_voxels(const VoxelType& type, const DecodeCounts& counts, const VoxelStatistics& statistics,
+                    std::vector<std::string>& warnings) {
+  if (counts.inexact > 0) {
+    warnings.push_back("precision-reduced: " + std::to_string(counts.inexact) +
+                       " voxels have more digits than float32 holds and are rounded to it.");
+  }
+  if (looks_like_labels(type, statistics)) {
+    warnings.push_back("label-like-data: integers of only " + std::to_string(statistics.distinct()) +
+                       " distinct values; smoothing mixes labels.");
+  }
+  if (looks_padded(statistics)) {
+    warnings.push_back("padding-values: " + std::to_string(statistics.at_minimum()) +
+                       " voxels share a minimum far below all others, as padding does.");
+  }
+}
+
+}  // namespace volsmooth
