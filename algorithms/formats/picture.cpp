@@ -32,21 +32,17 @@ struct Raster {
   Colour& at(std::int64_t x, std::int64_t y) { return pixels[static_cast<std::size_t>(y * width + x)]; }
 };
 
-/// Intensities that become black and white: the 1st and 99.5th percentile of at most about a million voxels.
+/// Intensities that become black and white: the 1st and 99.5th percentile of the slices' voxels.
 struct GreyWindow {
   double black, white;
 
-  explicit GreyWindow(const Volume& volume) {
-    constexpr std::size_t kSamples = std::size_t{1} << 20;
-    const auto voxels = voxels_of(volume);
-    std::vector<float> samples;
-    // An odd stride does not stay in few columns of a volume whose rows have an even length.
-    for (std::size_t at = 0; at < voxels.size(); at += voxels.size() / kSamples | 1)
-      samples.push_back(voxels[at]);
-    const auto percentile = [&samples](double part) {
+  explicit GreyWindow(const MiddleSlices& volume) {
+    std::vector<float> voxels;
+    for (const auto& slice : volume.slices) voxels.insert(voxels.end(), slice.begin(), slice.end());
+    const auto percentile = [&voxels](double part) {
       const auto place =
-          samples.begin() + static_cast<std::ptrdiff_t>(part * static_cast<double>(samples.size() - 1));
-      std::ranges::nth_element(samples, place);
+          voxels.begin() + static_cast<std::ptrdiff_t>(part * static_cast<double>(voxels.size() - 1));
+      std::ranges::nth_element(voxels, place);
       return double{*place};
     };
     black = percentile(0.01);
@@ -64,7 +60,7 @@ class FineSlice {
  public:
   static constexpr std::int64_t kMargin = 2;
 
-  FineSlice(const Volume& volume, const SliceView& view, double pixels_per_mm)
+  FineSlice(const MiddleSlices& volume, const SliceView& view, double pixels_per_mm)
       : width_(pixels(view.right, pixels_per_mm)),
         height_(pixels(view.down, pixels_per_mm)),
         stride_(width_ * kFine + 2 * kMargin),
@@ -151,9 +147,9 @@ void write_png(const std::filesystem::path& file, const Raster& raster) {
 
 }  // namespace
 
-void write_picture(const std::filesystem::path& file, const Volume& before, const Volume& after,
-                   const VoxelToWorld& map, std::span<const double> isovalues) {
-  const auto views = radiological_views(grid_of(before).size, map);
+void write_picture(const std::filesystem::path& file, const MiddleSlices& before, const MiddleSlices& after,
+                   std::span<const double> isovalues) {
+  const auto views = radiological_views(before.size, before.map);
   double longest = 0;
   for (const SliceView& view : views)
     longest = std::max({longest, view.right.extent_mm(), view.down.extent_mm()});
@@ -167,7 +163,7 @@ void write_picture(const std::filesystem::path& file, const Volume& before, cons
   Raster raster(width, 2 * height + 3 * kGap);
   const GreyWindow window(before);
   std::int64_t top = kGap;
-  for (const Volume* volume : {&before, &after}) {
+  for (const MiddleSlices* volume : {&before, &after}) {
     std::int64_t left = kGap;
     for (const SliceView& view : views) {
       const FineSlice slice(*volume, view, pixels_per_mm);

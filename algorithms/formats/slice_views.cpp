@@ -51,22 +51,39 @@ std::array<SliceView, 3> radiological_views(const Size3& size, const VoxelToWorl
   return views;
 }
 
-double intensity_at(const Volume& volume, const SliceView& view, double along_right, double along_down) {
-  const Size3 size = grid_of(volume).size;
-  const Size3 stride{1, size[0], size[0] * size[1]};
-  const auto low = [](double index, const SliceView::Direction& direction) {
+MiddleSlices middle_slices(const Volume& volume, const VoxelToWorld& map) {
+  MiddleSlices middle{grid_of(volume).size, map, {}};
+  const Size3 stride{1, middle.size[0], middle.size[0] * middle.size[1]};
+  for (std::size_t normal = 0; normal < 3; ++normal) {
+    const std::size_t fast = normal == 0 ? 1 : 0, slow = normal == 2 ? 1 : 2;
+    const float* first = voxels_of(volume).data() + middle.size[normal] / 2 * stride[normal];
+    std::vector<float>& slice = middle.slices[normal];
+    slice.reserve(static_cast<std::size_t>(middle.size[fast] * middle.size[slow]));
+    for (std::int64_t j = 0; j < middle.size[slow]; ++j) {
+      for (std::int64_t i = 0; i < middle.size[fast]; ++i) {
+        slice.push_back(first[i * stride[fast] + j * stride[slow]]);
+      }
+    }
+  }
+  return middle;
+}
+
+double intensity_at(const MiddleSlices& volume, const SliceView& view, double along_right,
+                    double along_down) {
+  const bool right_is_fast = view.right.axis < view.down.axis;
+  const std::int64_t to_right = right_is_fast ? 1 : view.down.count;
+  const std::int64_t to_down = right_is_fast ? view.right.count : 1;
+  const auto low = [](double index, std::int64_t count) {
     return std::clamp<std::int64_t>(static_cast<std::int64_t>(index), 0,
-                                    std::max<std::int64_t>(direction.count - 2, 0));
+                                    std::max<std::int64_t>(count - 2, 0));
   };
-  const std::int64_t i = low(along_right, view.right), j = low(along_down, view.down);
-  const std::int64_t to_right = view.right.count > 1 ? stride[view.right.axis] : 0;
-  const std::int64_t to_down = view.down.count > 1 ? stride[view.down.axis] : 0;
+  const std::int64_t i = low(along_right, view.right.count), j = low(along_down, view.down.count);
   const double u = along_right - static_cast<double>(i), v = along_down - static_cast<double>(j);
 
-  const float* corner = voxels_of(volume).data() + size[view.normal_axis] / 2 * stride[view.normal_axis] +
-                        i * stride[view.right.axis] + j * stride[view.down.axis];
-  const double upper = (1 - u) * double{corner[0]} + u * double{corner[to_right]};
-  const double lower = (1 - u) * double{corner[to_down]} + u * double{corner[to_down + to_right]};
+  const float* corner = volume.slices[view.normal_axis].data() + i * to_right + j * to_down;
+  const std::int64_t next_i = view.right.count > 1 ? to_right : 0, next_j = view.down.count > 1 ? to_down : 0;
+  const double upper = (1 - u) * double{corner[0]} + u * double{corner[next_i]};
+  const double lower = (1 - u) * double{corner[next_j]} + u * double{corner[next_j + next_i]};
   return (1 - v) * upper + v * lower;
 }
 

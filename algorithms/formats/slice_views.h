@@ -3,7 +3,7 @@
 #include <array>
 #include <cstdint>
 
-#include "algorithms/volume/volume.h"
+#include "algorithms/formats/picture.h"
 
 namespace volsmooth {
 
@@ -28,7 +28,7 @@ struct SliceView {
 /// or front (sagittal) at the left, anterior or superior up.
 std::array<SliceView, 3> radiological_views(const Size3& size, const VoxelToWorld& map);
 
-/// The intensity in the middle slice of a view at voxel indices along `right` and `down`, bilinear.
-double intensity_at(const Volume& volume, const SliceView& view, double along_right, double along_down);
+/// The intensity at voxel indices along `right` and `down` of a view, bilinear.
+double intensity_at(const MiddleSlices& volume, const SliceView& view, double along_right, double along_down);
 
 }  // namespace volsmooth
