@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string_view>
+#include <tl/expected.hpp>
+
+#include "service/http/message.h"
+
+namespace volsmooth {
+
+/// What a route takes as its body.
+enum class BodyKind {
+  kNone,  ///< a small one is received and ignored
+  kJson,
+  kFile,   ///< the file itself, or a multipart form with the part `volume`
+  kOrder,  ///< JSON, or a multipart form with the parts `volume` (a file) and `job` (JSON)
+};
+
+inline constexpr std::int64_t kMaxTextBytes = std::int64_t{1} << 20;
+
+struct BodyRules {
+  std::int64_t max_upload_bytes = 0;
+  std::function<tl::expected<IncomingFile, Problem>(std::optional<std::int64_t> declared_bytes)> begin_upload;
+};
+
+/// Puts a body as it arrives into the request it belongs to. Its calls may block on the disk.
+class BodyReceiver {
+ public:
+  virtual ~BodyReceiver() = default;
+  virtual tl::expected<void, Problem> receive(std::string_view bytes) = 0;
+  virtual tl::expected<void, Problem> finish() { return {}; }
+};
+
+/// Checks what the head says about the body (length-required, content-too-large, unsupported-media-type, what
+/// beginning an upload gives) before any of it is read.
+tl::expected<std::unique_ptr<BodyReceiver>, Problem> receiver_for(BodyKind kind, Request& request,
+                                                                  const BodyRules& rules);
+
+}  // namespace volsmooth

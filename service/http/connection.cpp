@@ -1,0 +1,193 @@
+#include "service/http/connection.h"
+
+#include <sys/socket.h>
+
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <boost/beast/core/buffers_to_string.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/http/buffer_body.hpp>
+#include <boost/beast/http/chunk_encode.hpp>
+#include <boost/beast/http/empty_body.hpp>
+#include <boost/beast/http/parser.hpp>
+#include <boost/beast/http/read.hpp>
+#include <boost/beast/http/write.hpp>
+#include <chrono>
+#include <sstream>
+
+namespace volsmooth {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = boost::beast::http;
+using boost::system::error_code;
+
+constexpr auto kAwait = asio::as_tuple(asio::use_awaitable);
+
+/// What is read at once; also the most that a chunk's head or a trailer can grow to.
+constexpr std::size_t kReadBytes = 65536;
+constexpr std::size_t kMaxChunkExtensionBytes = 256;
+constexpr double kDiscardSeconds = 2;
+
+std::chrono::steady_clock::duration in_seconds(double seconds) {
+  return std::chrono::duration_cast<std::chrono::steady_clock::duration>(
+      std::chrono::duration<double>(seconds));
+}
+
+std::string_view text_of(const beast::flat_buffer& buffer) {
+  return {static_cast<const char*>(buffer.data().data()), buffer.size()};
+}
+
+}  // namespace
+
+/// Cancels what the socket waits for when the time is over, for as long as it lives.
+class Connection::Deadline {
+ public:
+  Deadline(Connection& connection, double seconds) : connection_(connection) {
+    connection.timer_.expires_after(in_seconds(seconds));
+    connection.timer_.async_wait([armed = std::weak_ptr(expired_), &connection](error_code cancelled) {
+      const auto expired = armed.lock();
+      if (cancelled || !expired) return;
+      *expired = true;
+      connection.cancel();
+    });
+  }
+  ~Deadline() { connection_.timer_.cancel(); }
+  Deadline(const Deadline&) = delete;
+  Deadline& operator=(const Deadline&) = delete;
+
+  ReadFailure failure() const { return *expired_ ? ReadFailure::kTimeout : ReadFailure::kClosed; }
+
+ private:
+  Connection& connection_;
+  std::shared_ptr<bool> expired_ = std::make_shared<bool>(false);
+};
+
+struct Connection::Codec {
+  using Parser = http::request_parser<http::buffer_body>;
+
+  beast::flat_buffer received{kReadBytes};
+  std::optional<Parser> parser;
+  std::size_t head_bytes = 0;
+
+  /// Beast takes extensions of any length.
+  std::function<void(std::uint64_t, beast::string_view, error_code&)> check_extensions =
+      [](std::uint64_t, beast::string_view extensions, error_code& error) {
+        if (extensions.size() > kMaxChunkExtensionBytes) error = http::error::bad_chunk_extension;
+      };
+};
+
+Connection::Connection(Socket socket)
+    : socket_(std::move(socket)), timer_(socket_.get_executor()), codec_(std::make_unique<Codec>()) {
+  codec_->received.reserve(kReadBytes);
+}
+
+Connection::~Connection() = default;
+
+asio::awaitable<bool> Connection::wait_for_request(double seconds) {
+  auto& received = codec_->received;
+  if (received.size() > 0) co_return true;
+  const Deadline deadline(*this, seconds);
+  const auto [error, count] = co_await socket_.async_read_some(received.prepare(kMaxHeadBytes + 1), kAwait);
+  received.commit(count);
+  co_return !error;
+}
+
+asio::awaitable<tl::expected<std::string_view, ReadFailure>> Connection::read_head(double seconds) {
+  auto& received = codec_->received;
+  const Deadline deadline(*this, seconds);
+  for (;;) {
+    const auto text = text_of(received);
+    const auto end = head_end(text);
+    if (end || text.size() > kMaxHeadBytes) {
+      codec_->head_bytes = end.value_or(text.size());
+      co_return text.substr(0, codec_->head_bytes);
+    }
+    const auto wanted = kMaxHeadBytes + 1 - text.size();
+    const auto [error, count] = co_await socket_.async_read_some(received.prepare(wanted), kAwait);
+    if (error) co_return tl::unexpected(deadline.failure());
+    received.commit(count);
+  }
+}
+
+bool Connection::begin_body() {
+  auto& parser = codec_->parser.emplace();
+  parser.header_limit(static_cast<std::uint32_t>(kReadBytes));
+  parser.body_limit(boost::none);
+  parser.on_chunk_header(codec_->check_extensions);
+  error_code error;
+  const auto head = asio::buffer(codec_->received.data(), codec_->head_bytes);
+  const auto used = parser.put(head, error);
+  codec_->received.consume(used);
+  return !error && used == codec_->head_bytes && parser.is_header_done();
+}
+
+asio::awaitable<tl::expected<std::string_view, ReadFailure>> Connection::read_body(std::span<char> block,
+                                                                                   double seconds_per_read) {
+  auto& parser = *codec_->parser;
+  auto& body = parser.get().body();
+  body.data = block.data();
+  body.size = block.size();
+  while (!parser.is_done() && body.size > 0) {
+    const Deadline deadline(*this, seconds_per_read);
+    const auto [error, count] = co_await http::async_read_some(socket_, codec_->received, parser, kAwait);
+    if (!error || error == http::error::need_buffer) continue;
+    const bool closed = error == http::error::partial_message || error == http::error::end_of_stream ||
+                        error.category() != http::make_error_code(http::error::bad_chunk).category();
+    co_return tl::unexpected(closed ? deadline.failure() : ReadFailure::kMalformed);
+  }
+  co_return std::string_view(block.data(), block.size() - body.size);
+}
+
+asio::awaitable<bool> Connection::write(std::string_view bytes, double seconds_per_write) {
+  while (!bytes.empty()) {
+    const Deadline deadline(*this, seconds_per_write);
+    const auto [error, count] = co_await socket_.async_write_some(asio::buffer(bytes), kAwait);
+    if (error) co_return false;
+    bytes.remove_prefix(count);
+  }
+  co_return true;
+}
+
+asio::awaitable<void> Connection::close_gently() {
+  error_code ignored;
+  socket_.shutdown(Socket::shutdown_send, ignored);
+  const Deadline deadline(*this, kDiscardSeconds);
+  std::vector<char> discarded(kReadBytes);
+  for (error_code error; !error;)
+    std::tie(error, std::ignore) = co_await socket_.async_read_some(asio::buffer(discarded), kAwait);
+  socket_.close(ignored);
+}
+
+void Connection::on_readable(std::function<void()> notice) {
+  socket_.async_wait(Socket::wait_read, [notice = std::move(notice)](error_code cancelled) {
+    if (!cancelled) notice();
+  });
+}
+
+bool Connection::peer_has_closed() {
+  char byte = 0;
+  const auto count = ::recv(socket_.native_handle(), &byte, 1, MSG_PEEK | MSG_DONTWAIT);
+  return count == 0 || (count < 0 && errno != EAGAIN && errno != EINTR);
+}
+
+void Connection::cancel() {
+  error_code ignored;
+  socket_.cancel(ignored);
+}
+
+std::string response_head(int status, const std::vector<HeaderField>& fields) {
+  http::response<http::empty_body> response(static_cast<http::status>(status), 11);
+  for (const auto& field : fields) response.insert(field.name, field.value);
+  std::ostringstream text;
+  text << response.base();
+  return text.str();
+}
+
+std::string as_chunk(std::string_view bytes) {
+  if (bytes.empty()) return beast::buffers_to_string(http::make_chunk_last());
+  return beast::buffers_to_string(http::make_chunk(asio::buffer(bytes)));
+}
+
+}  // namespace volsmooth

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/generic/stream_protocol.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <tl/expected.hpp>
+
+#include "service/http/head_check.h"
+
+namespace volsmooth {
+
+/// TCP or Unix, all the same: one instantiation of Beast serves both.
+using Socket = boost::asio::generic::stream_protocol::socket;
+
+enum class ReadFailure { kClosed, kTimeout, kMalformed };
+
+/// The bytes of one connection, each wait with its deadline: heads as they came, bodies without their
+/// framing (by Beast), and what is written. Used from the I/O thread.
+class Connection {
+ public:
+  explicit Connection(Socket socket);
+  ~Connection();
+
+  /// Whether the next request began within `seconds`.
+  boost::asio::awaitable<bool> wait_for_request(double seconds);
+
+  /// The bytes of a head as `head_end` cuts them; they stay until `begin_body`.
+  boost::asio::awaitable<tl::expected<std::string_view, ReadFailure>> read_head(double seconds);
+
+  /// Hands the head to Beast, ready for its body; false if Beast does not like it.
+  bool begin_body();
+
+  /// The next bytes of the body in `block`: as many as it holds, fewer at the end, then none.
+  boost::asio::awaitable<tl::expected<std::string_view, ReadFailure>> read_body(std::span<char> block,
+                                                                                double seconds_per_read);
+
+  /// Whether all of it was taken; each part of it within `seconds_per_write`.
+  boost::asio::awaitable<bool> write(std::string_view bytes, double seconds_per_write);
+
+  /// Closes so that the peer sees what was written even while it still sends (RFC 9112, 9.6).
+  boost::asio::awaitable<void> close_gently();
+
+  /// Calls `notice` once when the peer sends something or closes, until `cancel`.
+  void on_readable(std::function<void()> notice);
+  bool peer_has_closed();
+  void cancel();  ///< ends the wait under way
+
+  boost::asio::any_io_executor executor() { return socket_.get_executor(); }
+
+ private:
+  class Deadline;
+  struct Codec;
+  Socket socket_;
+  boost::asio::steady_timer timer_;
+  std::unique_ptr<Codec> codec_;
+};
+
+/// The status line and the fields of a response, ending in an empty line.
+std::string response_head(int status, const std::vector<HeaderField>& fields);
+
+/// `bytes` as one chunk of a chunked body; no bytes: its end.
+std::string as_chunk(std::string_view bytes);
+
+}  // namespace volsmooth

@@ -1,0 +1,138 @@
+#include "service/http/answers.h"
+#include "service/http/file_reply.h"
+#include "service/http/handlers.h"
+#include "service/http/problem_types.h"
+#include "service/http/query_values.h"
+#include "service/jobs/job_json.h"
+#include "service/jobs/strict_json.h"
+
+namespace volsmooth {
+namespace {
+
+constexpr double kDefaultPage = 50;
+
+nlohmann::json document_of(const Job& job) {
+  auto document = to_json(job);
+  if (job.error) document["error"] = problem_document(*job.error);
+  return document;
+}
+
+nlohmann::json results_of(const Job& job) {
+  auto documents = nlohmann::json::array();
+  for (const auto& result : job.results) documents.push_back(to_json(result));
+  return documents;
+}
+
+Response accepted(const Job& job) {
+  return created(document_of(job), 202, "/v1/jobs/" + job.id);
+}
+
+tl::expected<Job, Problem> submit_text(Api& api, const std::string& text) {
+  return parse_json(text).and_then(order_from).and_then([&](const JobOrder& order) {
+    return api.jobs.submit(order);
+  });
+}
+
+/// Keeps the volume of a form and submits the order for it; leaves no volume behind without a job.
+tl::expected<Job, Problem> submit_form(Api& api, Request& request) {
+  auto document = parse_json(request.text);
+  if (!document) return tl::unexpected(document.error());
+  if (document->is_object() && document->contains("volume"))
+    return tl::unexpected(
+        Problem{"unknown-field", "Beside an uploaded volume, the job names none.", {{"field", "volume"}}});
+
+  const auto volume = api.jobs.keep_volume(std::move(*request.file), {});
+  if (!volume) return tl::unexpected(volume.error());
+  if (document->is_object()) (*document)["volume"] = volume->id;
+  auto job = order_from(*document).and_then([&](const JobOrder& order) { return api.jobs.submit(order); });
+  if (!job) (void)api.jobs.delete_volume(volume->id);
+  return job;
+}
+
+/// RFC: https://html.spec.whatwg.org/multipage/server-sent-events.html#event-stream-interpretation
+std::string as_event(const JobEvent& event) {
+  return "id: " + event.id + "\nevent: " + event.kind + "\ndata: " + event.data + "\n\n";
+}
+
+Subscribe subscribe_to(Api& api, const std::string& id) {
+  return [&api, id](std::function<void()> wake) { return api.jobs.subscribe(id, std::move(wake)); };
+}
+
+/// The events after `last_id`, which moves on with them.
+tl::expected<EventStream::Batch, Problem> next_events(Api& api, const std::string& id, std::string& last_id) {
+  // Looked at first: when the job is final here, all of its events are there below.
+  const auto job = api.jobs.job(id);
+  if (!job) return tl::unexpected(job.error());
+  const auto events = api.jobs.events_after(id, last_id);
+  if (!events) return tl::unexpected(events.error());
+  EventStream::Batch batch{{}, is_final(job->state)};
+  for (const auto& event : *events) batch.text += as_event(event);
+  if (!events->empty()) last_id = events->back().id;
+  return batch;
+}
+
+}  // namespace
+
+Reply post_job(Api& api, Request& request) {
+  return (request.file ? submit_form(api, request) : submit_text(api, request.text)).map(accepted);
+}
+
+Reply get_jobs(Api& api, Request& request) {
+  const auto& query = request.query;
+  const JobQuery wanted{
+      job_state_from(text_in(query, "state")), text_in(query, "method"), text_in(query, "label"),
+      static_cast<int>(number_in(query, "limit").value_or(kDefaultPage)), text_in(query, "cursor")};
+  return api.jobs.jobs(wanted).map([](const JobPage& page) {
+    auto documents = nlohmann::json::array();
+    for (const auto& job : page.jobs) documents.push_back(document_of(job));
+    const auto next = page.next_cursor.empty() ? nlohmann::json() : nlohmann::json(page.next_cursor);
+    return json_response({{"jobs", documents}, {"next_cursor", next}});
+  });
+}
+
+Reply get_job(Api& api, Request& request) {
+  const std::string id = request.path["id"];
+  const auto wait = number_in(request.query, "wait").value_or(0);
+  if (wait == 0) return api.jobs.job(id).map([](const Job& job) { return json_response(document_of(job)); });
+
+  const auto ask = [&api, id] {
+    return api.jobs.job(id).map([](const Job& job) {
+      return LongPoll::Answer{document_of(job).dump(), is_final(job.state)};
+    });
+  };
+  const auto patience = std::chrono::milliseconds(static_cast<std::int64_t>(1000 * wait));
+  return Response{200, {{"Cache-Control", "no-store"}}, LongPoll{subscribe_to(api, id), patience, ask}};
+}
+
+Reply get_job_events(Api& api, Request& request) {
+  const std::string id = request.path["id"];
+  std::string last_id(request.head.header("last-event-id"));
+  return api.jobs.events_after(id, last_id).map([&](const auto&) {
+    const auto next = [&api, id, last_id]() mutable { return next_events(api, id, last_id); };
+    return Response{200, {{"Cache-Control", "no-store"}}, EventStream{subscribe_to(api, id), next}};
+  });
+}
+
+Reply cancel_job(Api& api, Request& request) {
+  return api.jobs.cancel(request.path["id"]).map([](const Job& job) {
+    return json_response(document_of(job), 202);
+  });
+}
+
+Reply delete_job(Api& api, Request& request) {
+  return api.jobs.delete_job(request.path["id"]).map([] { return Response{204}; });
+}
+
+Reply get_results(Api& api, Request& request) {
+  return api.jobs.job(request.path["id"]).map([](const Job& job) {
+    return json_response({{"results", results_of(job)}});
+  });
+}
+
+Reply get_result(Api& api, Request& request) {
+  return api.jobs.result(request.path["id"], request.path["name"]).and_then([&](const StoredFile& file) {
+    return reply_with_file(request, file);
+  });
+}
+
+}  // namespace volsmooth

@@ -1,0 +1,50 @@
+#include "service/http/log.h"
+
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <nlohmann/json.hpp>
+
+namespace volsmooth {
+namespace {
+
+/// Text as a JSON string; what is not UTF-8 is replaced.
+std::string quoted(std::string_view text) {
+  return nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+}  // namespace
+
+void start_log(const std::string& level) {
+  auto logger = spdlog::stderr_logger_mt("volsmoothd");
+  logger->set_pattern(R"({"time":"%Y-%m-%dT%H:%M:%S.%eZ","level":"%l",%v})", spdlog::pattern_time_type::utc);
+  logger->set_level(spdlog::level::from_str(level));
+  logger->flush_on(spdlog::level::info);
+  spdlog::set_default_logger(std::move(logger));
+}
+
+void log_request(const RequestRecord& request) {
+  spdlog::info(
+      R"("event":"request","request":{},"method":"{}","route":"{}","status":{},"bytes_in":{},"bytes_out":{},"ms":{:.1f})",
+      request.id, request.method, request.route, request.status, request.bytes_in, request.bytes_out,
+      1000 * request.seconds);
+}
+
+void log_fault(std::uint64_t request_id, std::string_view route, std::string_view what) {
+  spdlog::error(R"("event":"fault","request":{},"route":"{}","what":{})", request_id, route, quoted(what));
+}
+
+void log_job(const Job& job) {
+  const std::chrono::duration<double> taken =
+      job.started_at && job.finished_at ? *job.finished_at - *job.started_at : Time::duration::zero();
+  spdlog::info(
+      R"("event":"job","job":"{}","method":"{}","state":"{}","problem":"{}","attempt":{},"ms":{:.1f})",
+      job.id, job.order.method, name_of(job.state), job.error ? job.error->slug : "", job.attempt,
+      1000 * taken.count());
+}
+
+void log_event(std::string_view event, std::string_view message) {
+  spdlog::info(R"("event":"{}","message":{})", event, quoted(message));
+}
+
+}  // namespace volsmooth

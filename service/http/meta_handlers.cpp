@@ -1,0 +1,53 @@
+#include "service/http/answers.h"
+#include "service/http/handlers.h"
+#include "service/http/metrics.h"
+#include "service/http/openapi.h"
+#include "service/jobs/job_json.h"
+
+namespace volsmooth {
+namespace {
+
+nlohmann::json as_document(const Engine::Format& format) {
+  return {{"name", format.name}, {"media_type", format.media_type}, {"description", format.description}};
+}
+
+}  // namespace
+
+Reply get_methods(Api& api, Request&) {
+  auto methods = nlohmann::json::array();
+  for (const auto& method : api.jobs.engine().methods) methods.push_back(to_json(method));
+  return json_response({{"methods", methods}});
+}
+
+Reply get_formats(Api& api, Request&) {
+  auto meshes = nlohmann::json::array();
+  for (const auto& format : api.jobs.engine().mesh_formats) meshes.push_back(as_document(format));
+  const nlohmann::json nifti = {as_document({"nifti-1", "application/gzip",
+                                             "NIfTI-1 in one file (.nii or .nii.gz), either byte order."}),
+                                as_document({"nifti-2", "application/gzip",
+                                             "NIfTI-2 in one file (.nii or .nii.gz), either byte order."})};
+  return json_response({{"inputs", nifti}, {"outputs", nifti}, {"meshes", meshes}});
+}
+
+Reply get_healthz(Api&, Request&) {
+  return json_response({{"status", "ok"}});
+}
+
+Reply get_readyz(Api& api, Request&) {
+  if (const auto reason = api.jobs.not_ready_because())
+    return tl::unexpected(Problem{"not-ready", "No jobs are taken now: " + *reason + "."});
+  return json_response({{"status", "ready"}});
+}
+
+Reply get_metrics(Api& api, Request&) {
+  return Response{
+      200,
+      {{"Cache-Control", "no-store"}},
+      Document{api.metrics.text(api.jobs.statistics()), "text/plain; version=0.0.4; charset=utf-8"}};
+}
+
+Reply get_openapi(Api& api, Request&) {
+  return json_response(openapi_document(api.jobs.engine().methods));
+}
+
+}  // namespace volsmooth

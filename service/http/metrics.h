@@ -1,0 +1,32 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "service/jobs/job_service.h"
+
+namespace volsmooth {
+
+/// What the daemon counts about itself. Thread-safe. Labels come from tables, never from requests.
+class Metrics {
+ public:
+  Metrics();
+  ~Metrics();
+
+  /// `route` is the pattern, or empty when none matched.
+  void request_done(std::string_view method, std::string_view route, int status, double seconds);
+  void job_done(const Job& job);
+
+  /// Counts an upload as being received as long as the handle lives.
+  std::shared_ptr<void> upload_begins();
+
+  /// Prometheus' text format, with the gauges as of now.
+  std::string text(const ServiceStatistics& now);
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace volsmooth

@@ -1,0 +1,101 @@
+#include "service/http/openapi.h"
+
+#include "service/http/ascii.h"
+#include "service/http/problem_types.h"
+#include "service/http/routes.h"
+
+namespace volsmooth {
+namespace {
+
+using nlohmann::json;
+
+json reference(std::string_view schema) {
+  return {{"$ref", "#/components/schemas/" + std::string(schema)}};
+}
+
+json schema_of(const QueryParameter& parameter) {
+  if (parameter.kind != QueryParameter::Kind::kText)
+    return {{"type", parameter.kind == QueryParameter::Kind::kInteger ? "integer" : "number"},
+            {"minimum", parameter.minimum},
+            {"maximum", parameter.maximum}};
+  json schema = {{"type", "string"}};
+  if (!parameter.choices.empty()) schema["enum"] = parameter.choices;
+  return schema;
+}
+
+json parameters_of(const Route& route) {
+  json parameters = json::array();
+  for (const auto part : split(route.pattern, '/'))
+    if (part.starts_with('{'))
+      parameters.push_back({{"name", part.substr(1, part.size() - 2)},
+                            {"in", "path"},
+                            {"required", true},
+                            {"schema", {{"type", "string"}}}});
+  for (const auto& parameter : route.query)
+    parameters.push_back({{"name", parameter.name},
+                          {"in", "query"},
+                          {"description", parameter.description},
+                          {"schema", schema_of(parameter)}});
+  return parameters;
+}
+
+json body_of(const Route& route) {
+  const json file = {{"type", "string"}, {"format", "binary"}};
+  json form = {{"type", "object"}, {"required", {"volume"}}, {"properties", {{"volume", file}}}};
+  json content;
+  if (route.body == BodyKind::kFile) {
+    content["application/octet-stream"] = {{"schema", file}};
+  } else {
+    content["application/json"] = {{"schema", reference(route.body_schema)}};
+    form["required"].push_back("job");
+    form["properties"]["job"] = {{"description", "The order without `volume`, as JSON."}, {"type", "string"}};
+  }
+  if (route.body != BodyKind::kJson) content["multipart/form-data"] = {{"schema", form}};
+  return {{"required", true}, {"content", content}};
+}
+
+json responses_of(const Route& route) {
+  const Answer& answer = route.answer;
+  json success = {{"description", answer.description}};
+  if (!answer.media_type.empty()) {
+    json content = json::object();
+    if (!answer.schema.empty()) content["schema"] = reference(answer.schema);
+    success["content"][std::string(answer.media_type)] = content;
+  }
+  json problem = {{"description", "Why not."}};
+  problem["content"]["application/problem+json"]["schema"] = reference("Problem");
+  return {{std::to_string(answer.status), success}, {"default", problem}};
+}
+
+/// Such as "post_v1_jobs_id_cancel".
+std::string operation_id(const Route& route) {
+  std::string id = lowered(route.method);
+  for (const char c : route.pattern) {
+    if (is_letter(c) || is_digit(c)) id += c;
+    if (c == '/') id += '_';
+  }
+  return id;
+}
+
+}  // namespace
+
+json openapi_document(const std::vector<MethodInfo>& methods) {
+  json paths;
+  for (const auto& route : routes()) {
+    json operation = {{"operationId", operation_id(route)},
+                      {"summary", route.summary},
+                      {"parameters", parameters_of(route)},
+                      {"responses", responses_of(route)}};
+    if (route.body != BodyKind::kNone) operation["requestBody"] = body_of(route);
+    paths[std::string(route.pattern)][lowered(route.method)] = std::move(operation);
+  }
+  return {{"openapi", "3.1.0"},
+          {"info",
+           {{"title", "volsmooth"},
+            {"version", VOLSMOOTH_VERSION},
+            {"description", "Smooths medical volumes: all isosurfaces at once, by mean curvature flow."}}},
+          {"paths", paths},
+          {"components", {{"schemas", document_schemas(methods)}}}};
+}
+
+}  // namespace volsmooth

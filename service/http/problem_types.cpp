@@ -1,0 +1,106 @@
+#include "service/http/problem_types.h"
+
+#include <algorithm>
+#include <array>
+#include <stdexcept>
+
+namespace volsmooth {
+namespace {
+
+constexpr auto kTypes = std::to_array<ProblemType>({
+    // The request's framing and head
+    {"ambiguous-framing", 400, "The length of the request is ambiguous"},
+    {"bad-chunk", 400, "Malformed chunked body"},
+    {"bad-content-length", 400, "Malformed Content-Length"},
+    {"bad-header", 400, "Malformed request head"},
+    {"bad-host", 400, "Missing or malformed Host"},
+    {"bad-target", 400, "Malformed request target"},
+    {"content-too-large", 413, "The body is too large"},
+    {"expectation-failed", 417, "Unknown expectation"},
+    {"header-too-large", 431, "The request head is too large"},
+    {"length-required", 411, "A body is needed"},
+    {"misdirected-request", 421, "This host is not served here"},
+    {"request-timeout", 408, "The request did not arrive in time"},
+    {"unknown-method", 501, "Unknown HTTP method"},
+    {"unsupported-transfer-coding", 501, "Unsupported transfer coding"},
+    {"unsupported-version", 505, "Unsupported HTTP version"},
+    {"uri-too-long", 414, "The request target is too long"},
+    // What is asked for
+    {"bad-id", 400, "Malformed id"},
+    {"bad-json", 400, "Malformed JSON"},
+    {"bad-multipart", 400, "Malformed multipart body"},
+    {"bad-parameter", 422, "A parameter has a bad value"},
+    {"bad-query", 400, "Bad query parameter"},
+    {"digest-mismatch", 422, "The body does not have the digest that was sent"},
+    {"gone", 410, "It existed, and was deleted"},
+    {"job-too-expensive", 422, "The job would take too long"},
+    {"job-too-large", 422, "The job would take too much memory"},
+    {"method-not-allowed", 405, "The method is not offered here"},
+    {"not-acceptable", 406, "None of the accepted media types is available"},
+    {"not-found", 404, "There is no such thing"},
+    {"precondition-failed", 412, "A precondition does not hold"},
+    {"queue-full", 429, "The queue is full"},
+    {"quota", 429, "The quota is used up"},
+    {"range-not-satisfiable", 416, "The range lies outside the file"},
+    {"unknown-algorithm", 422, "Unknown method"},
+    {"unknown-field", 422, "Unknown member"},
+    {"unsupported-media-type", 415, "Unsupported media type"},
+    {"upload-incomplete", 409, "The upload is not complete"},
+    {"volume-in-use", 409, "The volume is in use"},
+    // Uploaded files
+    {"decompression-limit", 413, "The file unpacks to more than is allowed"},
+    {"empty-file", 422, "The file is empty"},
+    {"gzip-corrupt", 422, "Corrupt gzip data"},
+    {"gzip-trailing-data", 422, "Data after the end of the gzip stream"},
+    {"gzip-truncated", 422, "The gzip stream is cut short"},
+    {"nested-compression", 415, "Compressed twice"},
+    {"nifti-bad-dimensions", 422, "Bad dimensions in the NIfTI header"},
+    {"nifti-bad-extension", 422, "Bad NIfTI header extension"},
+    {"nifti-bad-header", 422, "Bad NIfTI header"},
+    {"nifti-bad-offset", 422, "Bad data offset in the NIfTI header"},
+    {"nifti-bad-orientation", 422, "Bad orientation in the NIfTI header"},
+    {"nifti-bad-scaling", 422, "Bad intensity scaling in the NIfTI header"},
+    {"nifti-bad-spacing", 422, "Bad voxel spacing in the NIfTI header"},
+    {"nifti-split-pair", 422, "Half of a NIfTI header/image pair"},
+    {"nifti-trailing-data", 422, "Data after the voxels"},
+    {"nifti-truncated-data", 422, "The voxels are cut short"},
+    {"nifti-truncated-header", 422, "The NIfTI header is cut short"},
+    {"non-finite-voxels", 422, "Voxels that are not numbers"},
+    {"unsupported-datatype", 422, "Unsupported voxel type"},
+    {"unsupported-dimensionality", 422, "Unsupported number of dimensions"},
+    {"unsupported-format", 415, "Unsupported file format"},
+    {"unsupported-geometry", 422, "Unsupported geometry"},
+    {"volume-too-large", 422, "The volume is too large"},
+    // The service's own troubles
+    {"attempts-exhausted", 500, "The job was given up"},
+    {"insufficient-storage", 507, "Not enough free storage"},
+    {"integrity-failure", 500, "A stored file is damaged"},
+    {"internal", 500, "Internal error"},
+    {"not-ready", 503, "The service is not ready"},
+    {"store-unavailable", 503, "The store is not available"},
+    {"too-many-connections", 503, "Too many connections"},
+});
+
+}  // namespace
+
+std::span<const ProblemType> problem_types() {
+  return kTypes;
+}
+
+const ProblemType& problem_type(std::string_view slug) {
+  const auto row = std::ranges::find(kTypes, slug, &ProblemType::slug);
+  if (row == kTypes.end()) throw std::logic_error("no problem type " + std::string(slug));
+  return *row;
+}
+
+nlohmann::json problem_document(const Problem& problem) {
+  const ProblemType& type = problem_type(problem.slug);
+  nlohmann::json document = problem.members;
+  document["type"] = "/problems/" + problem.slug;
+  document["title"] = type.title;
+  document["status"] = type.status;
+  document["detail"] = problem.detail;
+  return document;
+}
+
+}  // namespace volsmooth

@@ -1,0 +1,217 @@
+#include "service/http/server.h"
+
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/local/stream_protocol.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <charconv>
+#include <future>
+#include <stdexcept>
+#include <thread>
+#include <unordered_set>
+
+#include "service/http/ascii.h"
+#include "service/http/problem_types.h"
+#include "service/http/session.h"
+
+namespace volsmooth {
+namespace {
+
+namespace asio = boost::asio;
+using asio::ip::tcp;
+using asio::local::stream_protocol;
+using boost::system::error_code;
+
+constexpr std::string_view kUnixPrefix = "unix:";
+constexpr int kQuickThreads = 4;
+constexpr int kVerifyingThreads = 2;
+constexpr auto kGrace = std::chrono::seconds(5);
+constexpr auto kPauseAfterAcceptFailure = std::chrono::milliseconds(100);
+
+[[noreturn]] void fail(const std::string& sentence) {
+  throw std::runtime_error(sentence);
+}
+
+tcp::endpoint endpoint_of(const std::string& listen) {
+  const auto colon = listen.rfind(':');
+  if (colon == std::string::npos) fail("--listen takes ADDRESS:PORT or unix:PATH, such as 127.0.0.1:8742");
+  std::string address = listen.substr(0, colon);
+  if (address.starts_with('[') && address.ends_with(']')) address = address.substr(1, address.size() - 2);
+  if (address == "localhost") address = "127.0.0.1";
+  unsigned short port = 0;
+  const char* const end = listen.data() + listen.size();
+  const auto number = std::from_chars(listen.data() + colon + 1, end, port);
+  error_code bad_address;
+  const auto ip = asio::ip::make_address(address, bad_address);
+  if (bad_address || number.ec != std::errc() || number.ptr != end)
+    fail("--listen takes an IP address and a port from 0 to 65535, such as 127.0.0.1:8742");
+  return {ip, port};
+}
+
+tcp::acceptor listen_on(asio::io_context& io, const tcp::endpoint& endpoint, bool allow_open_network) {
+  if (!endpoint.address().is_loopback() && !allow_open_network)
+    fail("refusing to listen on " + endpoint.address().to_string() +
+         ": the daemon has no access control, so everyone who reaches that address could read and delete the "
+         "volumes. "
+         "Listen on 127.0.0.1, or add --allow-open-network when something in front of it does the checking.");
+  try {
+    return {io, endpoint, true};
+  } catch (const boost::system::system_error& error) {
+    fail("cannot listen on " + endpoint.address().to_string() + " port " + std::to_string(endpoint.port()) +
+         ": " + error.code().message());
+  }
+}
+
+/// Removes the socket that a daemon left behind when it was killed; a living one keeps its own.
+void remove_stale_socket(asio::io_context& io, const std::filesystem::path& path) {
+  stream_protocol::socket probe(io);
+  error_code answer;
+  probe.connect(stream_protocol::endpoint(path.string()), answer);
+  if (answer == asio::error::connection_refused) std::filesystem::remove(path);
+}
+
+stream_protocol::acceptor listen_on(asio::io_context& io, const std::filesystem::path& path) {
+  try {
+    remove_stale_socket(io, path);
+    stream_protocol::acceptor acceptor(io, stream_protocol::endpoint(path.string()));
+    std::filesystem::permissions(path,
+                                 std::filesystem::perms::owner_read | std::filesystem::perms::owner_write);
+    return acceptor;
+  } catch (const boost::system::system_error& error) {
+    fail("cannot listen on the Unix socket " + path.string() + ": " + error.code().message());
+  }
+}
+
+std::string too_many_connections() {
+  const Problem problem{"too-many-connections", "All connections are taken; try again later."};
+  const std::string document = problem_document(problem).dump();
+  return response_head(503, {{"Content-Type", "application/problem+json"},
+                             {"Content-Length", std::to_string(document.size())},
+                             {"Retry-After", "5"},
+                             {"Connection", "close"}}) +
+         document;
+}
+
+}  // namespace
+
+struct Server::State {
+  State(ServerSettings given, Api api)
+      : settings(std::move(given)), context{settings, api, {}, body_rules(settings, api), quick, verifying} {
+    for (const auto& name : settings.host_names) context.hosts.names.push_back(lowered(name));
+    listen();
+    thread = std::jthread([this] { io.run(); });
+  }
+
+  static BodyRules body_rules(const ServerSettings& settings, Api api) {
+    return {settings.max_upload_bytes,
+            [api](std::optional<std::int64_t> declared) { return api.jobs.begin_upload(declared); }};
+  }
+
+  void listen() {
+    if (settings.listen.starts_with(kUnixPrefix)) {
+      socket_path = settings.listen.substr(kUnixPrefix.size());
+      address = settings.listen;
+      serve(listen_on(io, socket_path));
+    } else {
+      auto acceptor = listen_on(io, endpoint_of(settings.listen), settings.allow_open_network);
+      const auto bound = acceptor.local_endpoint();
+      const auto host = bound.address().to_string();
+      address = "http://" + (bound.address().is_v6() ? "[" + host + "]" : host) + ":" +
+                std::to_string(bound.port());
+      serve(std::move(acceptor));
+    }
+  }
+
+  template <typename Acceptor>
+  void serve(Acceptor acceptor) {
+    auto shared = std::make_shared<Acceptor>(std::move(acceptor));
+    close_acceptor = [shared] {
+      error_code ignored;
+      shared->close(ignored);
+    };
+    asio::co_spawn(io, accept_all(shared), asio::detached);
+  }
+
+  template <typename Acceptor>
+  asio::awaitable<void> accept_all(std::shared_ptr<Acceptor> acceptor) {
+    while (acceptor->is_open()) {
+      auto [error, accepted] = co_await acceptor->async_accept(asio::as_tuple(asio::use_awaitable));
+      if (!error)
+        begin(Socket(std::move(accepted)));
+      else if (acceptor->is_open())
+        co_await asio::steady_timer(io, kPauseAfterAcceptFailure).async_wait(asio::use_awaitable);
+    }
+  }
+
+  void begin(Socket socket) {
+    if (context.stopping) return;
+    error_code ignored;
+    socket.set_option(tcp::no_delay(true), ignored);  // a Unix socket has no such option
+    if (sessions.size() >= static_cast<std::size_t>(settings.max_connections)) {
+      socket.non_blocking(true, ignored);
+      socket.write_some(asio::buffer(too_many_connections()), ignored);
+      return;
+    }
+    auto session = std::make_shared<Session>(std::move(socket), context);
+    sessions.insert(session.get());
+    asio::co_spawn(io, session->run(),
+                   [this, session](std::exception_ptr fault) { end(session.get(), fault); });
+  }
+
+  void end(Session* session, const std::exception_ptr& fault) {
+    sessions.erase(session);
+    try {
+      if (fault) std::rethrow_exception(fault);
+    } catch (const std::exception& error) {
+      log_fault(0, "", error.what());
+    }
+    if (context.stopping && sessions.empty()) all_ended.set_value();
+  }
+
+  void wind_down() {
+    context.stopping = true;
+    close_acceptor();
+    if (sessions.empty()) return all_ended.set_value();
+    for (Session* session : sessions) session->wind_down();
+  }
+
+  void stop() {
+    if (!thread.joinable()) return;
+    asio::post(io, [this] { wind_down(); });
+    all_ended.get_future().wait_for(kGrace);
+    io.stop();
+    thread.join();
+    if (!socket_path.empty()) std::filesystem::remove(socket_path);
+  }
+
+  ServerSettings settings;
+  SessionContext context;
+  std::string address;
+  std::filesystem::path socket_path;
+  std::unordered_set<Session*> sessions;
+  std::promise<void> all_ended;
+  std::function<void()> close_acceptor;
+  asio::io_context io{1};
+  // Gone before the I/O context: their threads hand results to it.
+  ThreadPool quick{kQuickThreads, ThreadPool::Priority::kNormal};
+  ThreadPool verifying{kVerifyingThreads, ThreadPool::Priority::kLow};
+  std::jthread thread;
+};
+
+Server::Server(ServerSettings settings, Api api)
+    : state_(std::make_unique<State>(std::move(settings), api)) {}
+Server::~Server() {
+  stop();
+}
+const std::string& Server::address() const {
+  return state_->address;
+}
+void Server::stop() {
+  state_->stop();
+}
+
+}  // namespace volsmooth

@@ -1,0 +1,86 @@
+#pragma once
+
+#include <boost/asio/awaitable.hpp>
+#include <memory>
+
+#include "service/http/body_receiver.h"
+#include "service/http/connection.h"
+#include "service/http/handlers.h"
+#include "service/http/host_check.h"
+#include "service/http/log.h"
+#include "service/http/routes.h"
+#include "service/http/server.h"
+#include "service/http/thread_pool.h"
+#include "service/http/wake.h"
+
+namespace volsmooth {
+
+/// What the sessions of a server share; belongs to the I/O thread, as all of a session does.
+struct SessionContext {
+  const ServerSettings& settings;
+  Api api;
+  HostNames hosts;
+  BodyRules body_rules;
+  ThreadPool& quick;      ///< for the store and the disk: milliseconds
+  ThreadPool& verifying;  ///< for handlers that were given a file: seconds
+  std::uint64_t last_request = 0;
+  bool stopping = false;
+};
+
+/// Serves the requests of one connection, in order.
+class Session {
+ public:
+  Session(Socket socket, SessionContext& context);
+
+  boost::asio::awaitable<void> run();
+
+  /// Ends a wait for a request or for news; lets an answer that is under way finish.
+  void wind_down();
+
+ private:
+  /// One request on its way through.
+  struct Exchange {
+    Request request;
+    const Route* route = nullptr;
+    RequestRecord record;
+    bool keep_alive = false;
+  };
+  template <typename T>
+  using Awaitable = boost::asio::awaitable<T>;
+
+  /// Runs `work`, which returns an expected value, on a pool; what it throws becomes a problem.
+  template <typename Work>
+  static Awaitable<std::invoke_result_t<Work>> run_guarded(ThreadPool& pool, const Exchange& exchange,
+                                                           Work work) {
+    return pool.run([&exchange, work]() -> std::invoke_result_t<Work> {
+      try {
+        return work();
+      } catch (const std::exception& error) {
+        return tl::unexpected(fault(exchange, error));
+      }
+    });
+  }
+  static Problem fault(const Exchange& exchange, const std::exception& error);
+
+  Awaitable<bool> serve_one();
+  Awaitable<void> serve(Exchange& exchange);
+  Awaitable<void> handle(Exchange& exchange, std::unique_ptr<BodyReceiver> receiver);
+  Awaitable<void> refuse_unread(Exchange& exchange, Problem problem);
+  Awaitable<tl::expected<void, Problem>> receive_body(Exchange& exchange, BodyReceiver& receiver);
+
+  tl::expected<void, Problem> admit(Exchange& exchange) const;
+
+  Awaitable<void> send(Exchange& exchange, Reply reply);
+  Awaitable<bool> send_file(Exchange& exchange, const FileBody& body);
+  Awaitable<bool> send_events(Exchange& exchange, EventStream& stream);
+  Awaitable<Reply> wait_for(Exchange& exchange, LongPoll& poll, Response head);
+  Awaitable<bool> write(Exchange& exchange, std::string_view bytes);
+
+  Connection connection_;
+  SessionContext& context_;
+  bool idle_ = false;
+  bool unread_ = false;         ///< whether the peer may still be sending what nobody will read
+  std::shared_ptr<Wake> wake_;  ///< while it waits for news
+};
+
+}  // namespace volsmooth

@@ -1,0 +1,51 @@
+#include "service/http/answers.h"
+#include "service/http/file_reply.h"
+#include "service/http/handlers.h"
+#include "service/http/query_values.h"
+#include "service/jobs/job_json.h"
+
+namespace volsmooth {
+namespace {
+
+UploadOptions upload_options(const QueryValues& query) {
+  UploadOptions options;
+  if (const auto index = number_in(query, "volume_index"))
+    options.volume_index = static_cast<std::int64_t>(*index);
+  options.non_finite = number_in(query, "non_finite");
+  options.series = text_in(query, "series");
+  options.resample = text_in(query, "resample");
+  return options;
+}
+
+}  // namespace
+
+Reply post_volume(Api& api, Request& request) {
+  return api.jobs.keep_volume(std::move(*request.file), upload_options(request.query))
+      .map([](const StoredVolume& volume) {
+        return created(to_json(volume), 201, "/v1/volumes/" + volume.id);
+      });
+}
+
+Reply get_volumes(Api& api, Request&) {
+  auto documents = nlohmann::json::array();
+  for (const auto& volume : api.jobs.volumes()) documents.push_back(to_json(volume));
+  return json_response({{"volumes", documents}});
+}
+
+Reply get_volume(Api& api, Request& request) {
+  return api.jobs.volume(request.path["id"]).map([](const StoredVolume& volume) {
+    return json_response(to_json(volume));
+  });
+}
+
+Reply get_volume_content(Api& api, Request& request) {
+  return api.jobs.volume_content(request.path["id"]).and_then([&](const StoredFile& file) {
+    return reply_with_file(request, file);
+  });
+}
+
+Reply delete_volume(Api& api, Request& request) {
+  return api.jobs.delete_volume(request.path["id"]).map([] { return Response{204}; });
+}
+
+}  // namespace volsmooth

@@ -1,0 +1,145 @@
+// The composition root: the only file that knows everyone.
+
+#include <signal.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <stdexcept>
+
+#include "service/http/log.h"
+#include "service/http/metrics.h"
+#include "service/http/server.h"
+#include "service/jobs/job_service.h"
+#include "service/pipeline/pipeline.h"
+
+namespace volsmooth {
+namespace {
+
+struct Options {
+  ServerSettings server;
+  JobServiceSettings jobs;
+  std::string log_level = "info";
+  bool ephemeral = false;
+};
+
+void declare(CLI::App& app, Options& options) {
+  app.set_version_flag("--version", "volsmoothd " VOLSMOOTH_VERSION);
+  app.set_config("--config", "", "Reads options from this file (TOML or INI)")->envname("VOLSMOOTH_CONFIG");
+  app.add_option("--listen", options.server.listen, "ADDRESS:PORT (port 0: any free one) or unix:PATH")
+      ->envname("VOLSMOOTH_LISTEN")
+      ->capture_default_str();
+  app.add_option("--data", options.jobs.data_dir,
+                 "Folder of the volumes, jobs and results; made when missing")
+      ->envname("VOLSMOOTH_DATA")
+      ->required();
+  app.add_option("--threads", options.jobs.threads, "Compute threads of a job; 0: all cores")
+      ->envname("VOLSMOOTH_THREADS")
+      ->check(CLI::Range(0, 4096))
+      ->capture_default_str();
+  app.add_option("--workers", options.jobs.workers, "Jobs that run at the same time")
+      ->envname("VOLSMOOTH_WORKERS")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
+  app.add_option("--memory", options.jobs.memory_limit_bytes,
+                 "Memory of all running jobs, such as 8GB; 0: 80 % of the machine's")
+      ->envname("VOLSMOOTH_MEMORY")
+      ->transform(CLI::AsSizeValue(false))
+      ->capture_default_str();
+  app.add_option("--max-upload", options.jobs.max_upload_bytes, "Largest upload, such as 16GB")
+      ->envname("VOLSMOOTH_MAX_UPLOAD")
+      ->transform(CLI::AsSizeValue(false))
+      ->capture_default_str();
+  app.add_option("--log-level", options.log_level, "What is logged at least")
+      ->envname("VOLSMOOTH_LOG_LEVEL")
+      ->check(CLI::IsMember({"debug", "info", "warn", "error", "off"}))
+      ->capture_default_str();
+  app.add_option("--host-name", options.server.host_names,
+                 "A name by which clients address this daemon, beside localhost; repeatable")
+      ->envname("VOLSMOOTH_HOST_NAME");
+  app.add_flag(
+         "--allow-open-network", options.server.allow_open_network,
+         "Allows --listen on an address that others than this machine reach. There is no access control")
+      ->envname("VOLSMOOTH_ALLOW_OPEN_NETWORK");
+  app.add_flag("--ephemeral", options.ephemeral,
+               "Removes the data folder at the end; it must be new or empty")
+      ->envname("VOLSMOOTH_EPHEMERAL");
+}
+
+/// A folder that is removed at the end, unless it held something before.
+class EphemeralFolder {
+ public:
+  explicit EphemeralFolder(std::filesystem::path path) : path_(std::move(path)) {
+    if (std::filesystem::exists(path_) && !std::filesystem::is_empty(path_))
+      throw std::runtime_error(
+          "--ephemeral would remove what is in the data folder; give one that is new or empty");
+  }
+  ~EphemeralFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  EphemeralFolder(const EphemeralFolder&) = delete;
+  EphemeralFolder& operator=(const EphemeralFolder&) = delete;
+
+ private:
+  std::filesystem::path path_;
+};
+
+sigset_t end_signals() {
+  sigset_t set;
+  sigemptyset(&set);
+  sigaddset(&set, SIGTERM);
+  sigaddset(&set, SIGINT);
+  return set;
+}
+
+void serve(const Options& options) {
+  std::optional<EphemeralFolder> folder;
+  if (options.ephemeral) folder.emplace(options.jobs.data_dir);
+
+  Metrics metrics;
+  JobService jobs(options.jobs, make_engine({.max_memory_bytes = options.jobs.memory_limit_bytes}));
+  jobs.on_final([&metrics](const Job& job) {
+    metrics.job_done(job);
+    log_job(job);
+  });
+  Server server(options.server, {jobs, metrics});
+  jobs.start();
+  log_event("ready", "volsmoothd " VOLSMOOTH_VERSION " listening on " + server.address());
+
+  const sigset_t signals = end_signals();
+  int received = 0;
+  sigwait(&signals, &received);
+  log_event("stopping", received == SIGTERM ? "SIGTERM" : "SIGINT");
+  server.stop();
+  jobs.stop();
+}
+
+int run(int argc, char** argv) {
+  Options options;
+  CLI::App app("Smooths medical volumes; an HTTP service. GET /openapi.json describes it.", "volsmoothd");
+  declare(app, options);
+  CLI11_PARSE(app, argc, argv);
+  options.server.max_upload_bytes = options.jobs.max_upload_bytes;
+
+  // Before any thread is there: all inherit the mask, and only sigwait takes them.
+  const sigset_t signals = end_signals();
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  ::signal(SIGPIPE, SIG_IGN);
+  start_log(options.log_level);
+  try {
+    serve(options);
+    return 0;
+  } catch (const std::exception& error) {
+    std::cerr << "volsmoothd: " << error.what() << '\n';
+    return 1;
+  }
+}
+
+}  // namespace
+}  // namespace volsmooth
+
+int main(int argc, char** argv) {
+  return volsmooth::run(argc, argv);
+}
