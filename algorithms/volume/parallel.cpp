@@ -1,5 +1,6 @@
 #include "algorithms/volume/parallel.h"
 
+#include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/info.h>
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/task_arena.h>
@@ -11,6 +12,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <optional>
 
 namespace volsmooth {
 namespace {
@@ -43,7 +45,12 @@ void parallel_for(std::int64_t count, std::int64_t grain,
 }
 
 void with_threads(int threads, const std::function<void()>& body) {
-  oneapi::tbb::task_arena arena(threads > 0 ? threads : oneapi::tbb::info::default_concurrency());
+  const int cores = oneapi::tbb::info::default_concurrency();
+  std::optional<oneapi::tbb::global_control> more_than_cores;
+  if (threads > cores)
+    more_than_cores.emplace(oneapi::tbb::global_control::max_allowed_parallelism,
+                            static_cast<std::size_t>(threads));
+  oneapi::tbb::task_arena arena(threads > 0 ? threads : cores);
   LowPriorityWorkers low_priority(arena);
   arena.execute(body);
 }

@@ -1,0 +1,109 @@
+#include "algorithms/flows/laplacian.h"
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+#include <numeric>
+
+#include "tests/support/phantoms.h"
+
+namespace volsmooth {
+namespace {
+
+std::vector<float> smoothed(const Grid& grid, const std::vector<float>& values, double flow_time_mm2) {
+  auto volume = volume_of(grid, values);
+  smooth(*volume, Laplacian{flow_time_mm2});
+  return values_of(*volume);
+}
+
+double sum_of(const std::vector<float>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0);
+}
+
+/// A Gaussian of variance s^2 becomes one of variance s^2 + 2 t, lower by (s^2 / (s^2 + 2 t))^(3/2).
+double largest_error_of_gaussian(const Vector3& spacing) {
+  constexpr double kVariance = 9, kTime = 4;
+  const Grid grid = grid_over(spacing, 40);
+  const auto gaussian = [&](double variance) {
+    return nested_spheres(grid, [variance](double r) {
+      return std::pow(kVariance / variance, 1.5) * std::exp(-r * r / (2 * variance));
+    });
+  };
+  const auto out = smoothed(grid, sampled(grid, gaussian(kVariance)), kTime);
+  const auto exact = sampled<double>(grid, gaussian(kVariance + 2 * kTime));
+  double largest = 0;
+  for (std::size_t voxel = 0; voxel < out.size(); ++voxel)
+    largest = std::max(largest, std::abs(double{out[voxel]} - exact[voxel]));
+  return largest;
+}
+
+TEST(Laplacian, WidensAGaussianByTwiceTheFlowTimeAtSecondOrder) {
+  const double coarse = largest_error_of_gaussian({1, 1, 1}),
+               fine = largest_error_of_gaussian({0.5, 0.5, 0.5});
+  EXPECT_LT(coarse, 4e-3);
+  EXPECT_GT(std::log2(coarse / fine), 1.8);
+}
+
+/// 2.5 mm is coarse for a standard deviation of 3: the order is not quite reached yet.
+TEST(Laplacian, WidensAGaussianOnOtherVoxelsAtSecondOrder) {
+  const double coarse = largest_error_of_gaussian({1, 1, 2.5}),
+               fine = largest_error_of_gaussian({0.5, 0.5, 1.25});
+  EXPECT_LT(coarse, 1.2e-2);
+  EXPECT_GT(std::log2(coarse / fine), 1.7);
+}
+
+/// A cosine that fits the mirrored box is an eigenvector: each step multiplies it by the same factor.
+TEST(Laplacian, DampsACosineByTheFactorOfTheStencil) {
+  const Grid grid{{16, 3, 2}, {1.5, 1, 2}};
+  const double wave = std::numbers::pi * 3 / 16;
+  std::vector<float> cosine;
+  for_each_voxel(grid, [&](const Size3& i, const Vector3&) {
+    cosine.push_back(static_cast<float>(std::cos(wave * (static_cast<double>(i[0]) + 0.5))));
+  });
+  const StepPlan steps = plan(Laplacian{5}, grid.spacing_mm);
+  const double factor = std::pow(1 - steps.step_mm2 * (2 - 2 * std::cos(wave)) / (1.5 * 1.5), steps.steps);
+  const auto out = smoothed(grid, cosine, 5);
+  for (std::size_t voxel = 0; voxel < out.size(); ++voxel)
+    ASSERT_NEAR(out[voxel], factor * cosine[voxel], 1e-5);
+}
+
+/// Each step rounds every voxel by half a unit in the last place at most, 2^-14 for values below 1024; the
+/// errors are independent, so their sum is some root of their number.
+TEST(Laplacian, KeepsMassToRounding) {
+  const Grid grid{{31, 29, 23}, {1, 1, 2.5}};
+  const auto before = noise(grid.size, 2, 0, 1000);
+  const double steps = static_cast<double>(plan(Laplacian{10}, grid.spacing_mm).steps);
+  const double roundings = steps * static_cast<double>(before.size());
+  EXPECT_NEAR(sum_of(smoothed(grid, before, 10)), sum_of(before), 6 * std::sqrt(roundings) * 0x1p-14);
+}
+
+TEST(Laplacian, KeepsTheRangeOfAnyFloats) {
+  const Grid grid{{13, 12, 11}, {1, 1, 5}};
+  for (const float magnitude : {1e-38F, 1.0F, 1e20F, 1.6e38F}) {
+    const auto before = noise(grid.size, 9, -magnitude, magnitude);
+    const auto after = smoothed(grid, before, 3);
+    EXPECT_GE(std::ranges::min(after), std::ranges::min(before)) << magnitude;
+    EXPECT_LE(std::ranges::max(after), std::ranges::max(before)) << magnitude;
+  }
+}
+
+/// At twice the step, the pattern would change its sign for ever.
+TEST(Laplacian, DampsNoiseThatAlternatesFromVoxelToVoxel) {
+  const Grid grid{{10, 10, 10}, {1, 1, 1}};
+  std::vector<float> checkers;
+  for_each_voxel(grid, [&](const Size3& i, const Vector3&) {
+    checkers.push_back((i[0] + i[1] + i[2]) % 2 == 0 ? 1.0F : -1.0F);
+  });
+  const auto out = smoothed(grid, checkers, 1);
+  EXPECT_LT(std::ranges::max(out), 0.05F);
+}
+
+TEST(Laplacian, FillsTheBoxEvenlyInTheEnd) {
+  const Grid grid{{6, 1, 4}, {1, 1, 1}};
+  const auto before = noise(grid.size, 4, 0, 100);
+  const double mean = sum_of(before) / static_cast<double>(before.size());
+  for (const float value : smoothed(grid, before, 100)) ASSERT_NEAR(value, mean, 1e-3);
+}
+
+}  // namespace
+}  // namespace volsmooth

@@ -1,0 +1,37 @@
+#include "algorithms/flows/step_plan.h"
+
+#include <gtest/gtest.h>
+
+#include "algorithms/flows/laplacian.h"
+#include "algorithms/flows/mean_curvature_flow.h"
+
+namespace volsmooth {
+namespace {
+
+TEST(StepPlan, ReachesTheFlowTimeInTheFewestEqualSteps) {
+  const struct {
+    double flow_time, largest;
+    std::int64_t steps;
+  } cases[] = {{1, 1, 1}, {1, 0.5, 2}, {1, 0.4, 3}, {1e-6, 0.2, 1}, {1e6, 1e-3, 1000000000}};
+  for (const auto& [flow_time, largest, steps] : cases) {
+    const StepPlan plan = plan_steps(flow_time, largest);
+    EXPECT_EQ(plan.steps, steps);
+    EXPECT_DOUBLE_EQ(plan.step_mm2 * static_cast<double>(steps), flow_time);
+    EXPECT_LE(plan.step_mm2, largest);
+  }
+}
+
+/// 1 / ((sum 1/h) sqrt(sum 1/h^2)): 1 / (3 sqrt 3) h^2 = 0.192 h^2 for cubes.
+TEST(StepPlan, OfMeanCurvatureFlowIsTheBoundOfTheRangeProof) {
+  EXPECT_NEAR(plan(MeanCurvatureFlow{1e9}, {1, 1, 1}).step_mm2, 1 / (3 * std::sqrt(3.0)), 1e-5);
+  EXPECT_NEAR(plan(MeanCurvatureFlow{1e9}, {2, 2, 2}).step_mm2, 4 / (3 * std::sqrt(3.0)), 1e-4);
+  EXPECT_NEAR(plan(MeanCurvatureFlow{1e9}, {1, 1, 2.5}).step_mm2, 1 / (2.4 * std::sqrt(2.16)), 1e-5);
+}
+
+TEST(StepPlan, OfTheLaplacianDampsEveryWave) {
+  EXPECT_NEAR(plan(Laplacian{1e9}, {1, 1, 1}).step_mm2, 1.0 / 12, 1e-9);
+  EXPECT_NEAR(plan(Laplacian{1e9}, {1, 2, 4}).step_mm2, 1 / (4 * (1 + 0.25 + 0.0625)), 1e-9);
+}
+
+}  // namespace
+}  // namespace volsmooth
