@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "algorithms/surface/measures.h"
+#include "algorithms/surface/morton_order.h"
 #include "algorithms/surface/triangle_tree.h"
 #include "algorithms/surface/triangles_at_vertices.h"
 #include "algorithms/surface/vector_math.h"
@@ -97,13 +98,16 @@ Displacement displacement(const Mesh& moved, const Mesh& original, const Progres
   const std::vector<double> areas = vertex_areas(moved);
   const SignedDistance distance(original, std::move(triangles));
 
+  // Along the curve the nearest triangle of one vertex is a good guess for the next.
+  const std::vector<std::uint32_t> order = morton_order(moved.positions);
   std::vector<Part> parts(moved.positions.size() / kPerChunk + 1);
   parallel_for(
       static_cast<std::int64_t>(moved.positions.size()), kPerChunk,
       [&](std::int64_t begin, std::int64_t end) {
         Part& part = parts[static_cast<std::size_t>(begin / kPerChunk)];
         std::uint32_t guess = start;
-        for (auto v = static_cast<std::size_t>(begin); v < static_cast<std::size_t>(end); ++v) {
+        for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k) {
+          const std::uint32_t v = order[k];
           if (areas[v] == 0) continue;
           const double moved_by = distance(to_double(moved.positions[v]), guess);
           part.area += areas[v];

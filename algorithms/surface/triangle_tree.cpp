@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "algorithms/surface/morton_order.h"
 #include "algorithms/surface/vector_math.h"
 #include "algorithms/volume/parallel.h"
 
@@ -14,39 +15,13 @@ namespace {
 constexpr std::size_t kLeafSize = 4;
 constexpr std::int64_t kPerChunk = 1 << 14;
 
-/// Every third bit of the result is a bit of `coordinate`, which has 20.
-std::uint64_t spread(std::uint64_t coordinate) {
-  std::uint64_t bits = coordinate & 0xfffff;
-  bits = (bits | bits << 32) & 0x001f00000000ffff;
-  bits = (bits | bits << 16) & 0x001f0000ff0000ff;
-  bits = (bits | bits << 8) & 0x100f00f00f00f00f;
-  bits = (bits | bits << 4) & 0x10c30c30c30c30c3;
-  return (bits | bits << 2) & 0x1249249249249249;
-}
-
-/// Sorts triangles along a Morton curve through their first corners, so that neighbours in the list are near.
 void sort_by_place(const Mesh& mesh, std::vector<std::uint32_t>& triangles) {
-  Float3 low = mesh.positions.front(), high = low;
-  for (const Float3& position : mesh.positions) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      low[axis] = std::min(low[axis], position[axis]);
-      high[axis] = std::max(high[axis], position[axis]);
-    }
-  }
-  const float extent =
-      std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2], std::numeric_limits<float>::min()});
-  std::vector<std::pair<std::uint64_t, std::uint32_t>> keyed(triangles.size());
-  std::ranges::transform(triangles, keyed.begin(), [&](std::uint32_t triangle) {
-    const Float3& corner = mesh.positions[mesh.triangles[triangle][0]];
-    std::uint64_t key = 0;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto place = static_cast<std::uint64_t>((corner[axis] - low[axis]) / extent * 0xfffff);
-      key |= spread(place) << axis;
-    }
-    return std::pair(key, triangle);
-  });
-  std::ranges::sort(keyed);
-  std::ranges::transform(keyed, triangles.begin(), [](const auto& pair) { return pair.second; });
+  std::vector<Float3> corners(triangles.size());
+  std::ranges::transform(triangles, corners.begin(),
+                         [&mesh](std::uint32_t t) { return mesh.positions[mesh.triangles[t][0]]; });
+  const std::vector<std::uint32_t> unsorted = triangles;
+  std::ranges::transform(morton_order(corners), triangles.begin(),
+                         [&](std::uint32_t k) { return unsorted[k]; });
 }
 
 }  // namespace
