@@ -60,7 +60,8 @@ Expected<PartFile> PartFile::create(const std::filesystem::path& final_path) {
   std::string temporary = (final_path.parent_path() / ".volsmooth-XXXXXX").string();
   Descriptor descriptor(mkostemp(temporary.data(), O_CLOEXEC));
   const int error = errno;
-  PartFile file(final_path, descriptor ? temporary : "", std::move(descriptor));
+  if (!descriptor) temporary.clear();
+  PartFile file(final_path, std::move(temporary), std::move(descriptor));
   if (!file.descriptor_) return tl::unexpected(file.cannot_write(error));
   fchmod(file.descriptor_.get(), 0666 & ~current_umask());
   return file;
