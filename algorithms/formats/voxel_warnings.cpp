@@ -3,19 +3,23 @@
 namespace volsmooth {
 namespace {
 
-constexpr std::int64_t kMostLabels = 32;
+constexpr std::int64_t kFewLabels = 32;
+constexpr double kLabelRuns = 0.75;     ///< of the non-zero voxels that repeat the one before them
 constexpr double kPaddingShare = 0.01;  ///< of the voxels at the minimum ...
 constexpr double kPaddingGap = 0.05;    ///< ... which lies this much of the remaining range below all others
 
+/// Images of up to 8 bits have few distinct values as well, but not in runs as regions of one label have.
 bool looks_like_labels(const VoxelType& type, const VoxelStatistics& statistics) {
-  return type.is_integer && statistics.distinct() <= kMostLabels;
+  if (!type.is_integer || statistics.distinct() > VoxelStatistics::kMostDistinct) return false;
+  return statistics.distinct() <= kFewLabels || static_cast<double>(statistics.repeated()) >=
+                                                    kLabelRuns * static_cast<double>(statistics.non_zero());
 }
 
 /// Scanners fill what they did not see with a negative value far below air, such as -2000 or -3024.
 bool looks_padded(const VoxelStatistics& statistics) {
   const double gap = static_cast<double>(statistics.second_lowest()) - statistics.minimum();
   const double range = static_cast<double>(statistics.maximum()) - statistics.second_lowest();
-  return statistics.minimum() < 0 && statistics.distinct() > kMostLabels && gap >= kPaddingGap * range &&
+  return statistics.minimum() < 0 && statistics.distinct() > kFewLabels && gap >= kPaddingGap * range &&
          static_cast<double>(statistics.at_minimum()) >=
              kPaddingShare * static_cast<double>(statistics.count());
 }
