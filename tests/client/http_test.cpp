@@ -8,7 +8,7 @@
 
 #include "client/descriptor.h"
 #include "tests/client/canned_server.h"
-#include "tests/client/scratch_folder.h"
+#include "tests/support/scratch_folder.h"
 
 namespace volsmooth {
 namespace {
@@ -120,7 +120,7 @@ TEST_P(BrokenAnswer, IsUnreachable) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Bytes, BrokenAnswer,
-                         testing::Values("", "SSH-2.0-OpenSSH\r\n", "HTTP/1.1 200 -\r\nContent-Le",
+                         testing::Values("", "SSH-2.0-OpenSSH\r\n",
                                          "HTTP/1.1 200 -\r\nContent-Length: 10\r\n\r\nhalf",
                                          "HTTP/1.1 200 -\r\nTransfer-Encoding: chunked\r\n\r\n5\r\nhalf"));
 

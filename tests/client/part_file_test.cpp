@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "client/output_folder.h"
-#include "tests/client/scratch_folder.h"
+#include "tests/support/scratch_folder.h"
 
 namespace volsmooth {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <csignal>
 
-#include "tests/client/scratch_folder.h"
+#include "tests/support/scratch_folder.h"
 
 namespace volsmooth {
 namespace {
@@ -54,15 +54,17 @@ TEST_F(PrivateDaemonStart, TellsWhatCannotBeRun) {
 
 TEST_F(PrivateDaemonStart, GivesItAFolderOfOnesOwnAndNoDescriptors) {
   const std::string told = (scratch_ / "told").string();
-  const Descriptor leak(dup(STDERR_FILENO));
+  const Descriptor ours(dup2(STDERR_FILENO, 57));
   const auto daemon = start_script("echo \"$@\" >" + told + "; stat -c %a $(dirname $4) >>" + told +
-                                   "; ls -l /proc/$$/fd | grep -c pipe >>" + told + "; exit 3");
+                                   "; test -e /proc/$$/fd/57 && echo leaked >>" + told + "; exit 3");
   std::istringstream lines(scratch_.content("told"));
-  std::string arguments, mode;
+  std::string arguments, mode, leaked;
   std::getline(lines, arguments);
   std::getline(lines, mode);
+  std::getline(lines, leaked);
   EXPECT_THAT(arguments, testing::MatchesRegex("--listen unix:.*/socket --data .*/data --ephemeral"));
   EXPECT_EQ(mode, "700");
+  EXPECT_EQ(leaked, "");
 }
 
 TEST_F(PrivateDaemonStart, AnInterruptionEndsIt) {
