@@ -48,14 +48,22 @@ struct Phantom {
 
 class NestedSpheres : public testing::TestWithParam<Phantom> {};
 
-/// f(r) becomes f(sqrt(r^2 + 4 t)): the spheres of the whole foliation shrink by their own curvature. The
-/// scheme's leading error is Godunov's, (h/2) |kappa| |d2 rho| t ~ 0.4 % of the range here on 1 mm at t = 4.
+/// `profile(r)` about the outer corner of voxel (0,0,0): the mirrored border makes up the other octants.
+std::function<double(const Vector3&)> octant(const Grid& grid, std::function<double(double)> profile) {
+  const Vector3& h = grid.spacing_mm;
+  return [corner = Vector3{-h[0] / 2, -h[1] / 2, -h[2] / 2}, profile](const Vector3& position) {
+    return profile(distance(position, corner));
+  };
+}
+
+/// f(r) becomes f(sqrt(r^2 + 4 t)): the spheres of the whole foliation shrink by their own curvature. 96 mm,
+/// an octant of it.
 TEST_P(NestedSpheres, ComeBackOnTheExactFoliation) {
   const auto& [spacing, t, tolerance] = GetParam();
-  const Grid grid = grid_over(spacing, 96);
+  const Grid grid = grid_over(spacing, 48);
   const auto f = soft_step(28, 4, 1000);
-  const auto out = smoothed(grid, sampled(grid, nested_spheres(grid, f)), t);
-  const auto exact = nested_spheres(grid, [&](double r) { return f(std::sqrt(r * r + 4 * t)); });
+  const auto out = smoothed(grid, sampled(grid, octant(grid, f)), t);
+  const auto exact = octant(grid, [&](double r) { return f(std::sqrt(r * r + 4 * t)); });
   const auto everywhere = [](const Vector3&) { return true; };
   EXPECT_LT(error_of(grid, out, exact, everywhere).largest, tolerance * 1000);
 }
@@ -65,19 +73,17 @@ INSTANTIATE_TEST_SUITE_P(Issue, NestedSpheres,
                                          Phantom{{1, 1, 1}, 25, 0.03}, Phantom{{1, 1, 2.5}, 25, 0.05},
                                          Phantom{{2.5, 1, 1}, 4, 0.012}, Phantom{{1, 2.5, 1}, 4, 0.012}));
 
-/// The foliation of the table in numerics: spheres in [-1, 1]^3, `cells` along the first axis.
+/// Rms error on f(r) = (1 - tanh((r - 0.6)/0.25))/2 in an octant of [-1, 1]^3 at t = 0.04, where r < 0.85.
 template <class Scalar, class Smooth>
 double error_with_spacing(const Vector3& spacing, const Smooth& smooth_values) {
   constexpr double kTime = 0.04;
-  const Grid grid = grid_over(spacing, 2);
+  const Grid grid = grid_over(spacing, 1);
   const auto f = soft_step(0.6, 0.25);
-  const auto centre = centre_of(grid);
-  auto values = sampled<Scalar>(grid, nested_spheres(grid, f));
+  auto values = sampled<Scalar>(grid, octant(grid, f));
   smooth_values(values, grid, kTime);
-  return error_of(grid, values,
-                  nested_spheres(grid, [&](double r) { return f(std::sqrt(r * r + 4 * kTime)); }),
-                  [&](const Vector3& position) { return distance(position, centre) < 0.85; })
-      .rms;
+  const auto exact = octant(grid, [&](double r) { return f(std::sqrt(r * r + 4 * kTime)); });
+  const auto radius = octant(grid, [](double r) { return r; });
+  return error_of(grid, values, exact, [&](const Vector3& position) { return radius(position) < 0.85; }).rms;
 }
 
 double fast_error(const Vector3& spacing) {
@@ -101,7 +107,7 @@ TEST(MeanCurvatureFlow, ConvergesAtFirstOrderOnCubes) {
   const double coarse = fast_error({2.0 / 32, 2.0 / 32, 2.0 / 32});
   const double fine = fast_error({2.0 / 64, 2.0 / 64, 2.0 / 64});
   EXPECT_GT(std::log2(coarse / fine), 0.9);
-  EXPECT_LT(fine, 7.5e-3);  // the prototype's 6.9e-3, in another norm of the border
+  EXPECT_NEAR(fine, 6.9e-3, 2e-4);  // the figure of the prototype, written by other hands
 }
 
 TEST(MeanCurvatureFlow, ConvergesAtFirstOrderOnOtherVoxels) {
