@@ -89,7 +89,7 @@ inline Bytes edited(Bytes file, const std::vector<Edit>& edits) {
 }
 
 template <class T>
-T value_at(const Bytes& file, std::size_t offset) {
+T read_at(const Bytes& file, std::size_t offset) {
   T value;
   if (file.size() < offset + sizeof value) throw std::runtime_error("the file ends before the value");
   std::memcpy(&value, file.data() + offset, sizeof value);

@@ -63,12 +63,12 @@ struct Phantom {
   /// The largest distance of a result from f(sqrt(r^2 + 4 t)), which mean curvature flow makes of f(r).
   template <class T>
   double largest_error(const Bytes& file, double flow_time_mm2) const {
-    const double slope = value_at<float>(file, kSclSlope), inter = value_at<float>(file, kSclInter);
+    const double slope = read_at<float>(file, kSclSlope), inter = read_at<float>(file, kSclInter);
     double largest = 0;
     for_each_voxel([&](std::size_t voxel, int x, int y, int z) {
       if (!away_from_border(x, y, z)) return;
       const double r = distance_mm(x, y, z);
-      const double value = slope * value_at<T>(file, kData + voxel * sizeof(T)) + inter;
+      const double value = slope * read_at<T>(file, kData + voxel * sizeof(T)) + inter;
       largest = std::max(largest, std::abs(value - profile(std::sqrt(r * r + 4 * flow_time_mm2))));
     });
     return largest;
@@ -162,7 +162,7 @@ TEST_F(PhantomTest, AnOddAffineComesBackBitForBit) {
   EXPECT_EQ(volume.at("warnings"), json::array()) << "sform and qform agree";
   for (std::size_t row = 0; row < 3; ++row) {
     for (std::size_t column = 0; column < 4; ++column) {
-      const float written = value_at<float>(file, kSrow + 16 * row + 4 * column);
+      const float written = read_at<float>(file, kSrow + 16 * row + 4 * column);
       EXPECT_NEAR(volume["affine"][row][column].get<double>(), static_cast<double>(written), 1e-9);
     }
   }
@@ -177,9 +177,9 @@ TEST_F(PhantomTest, ScaledIntegersKeepTypeAndScaling) {
   EXPECT_NEAR(volume.at("intensity").at("max").get<double>(), kRangeEnd, 1);
 
   const Bytes result = smoothed(file, 4);
-  EXPECT_EQ(value_at<std::int16_t>(result, kDatatype), kDatatypeCode<std::int16_t>);
-  EXPECT_EQ(value_at<float>(result, kSclSlope), slope);
-  EXPECT_EQ(value_at<float>(result, kSclInter), inter);
+  EXPECT_EQ(read_at<std::int16_t>(result, kDatatype), kDatatypeCode<std::int16_t>);
+  EXPECT_EQ(read_at<float>(result, kSclSlope), slope);
+  EXPECT_EQ(read_at<float>(result, kSclInter), inter);
   EXPECT_EQ(result.size(), file.size());
   const double rounding = 2 * 0.125 / 2;  // on the way in and out
   EXPECT_LT(kIsotropic.largest_error<std::int16_t>(result, 4), 0.006 * kRangeEnd + rounding);

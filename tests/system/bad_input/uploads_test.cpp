@@ -59,7 +59,7 @@ TEST(BadUploads, DescriptionsAreReplaced) {
   const Bytes result = gunzip(survivor().service().fetch(job.at("id"), "mean-curvature-flow.nii.gz"));
   EXPECT_EQ(result.find(Survivor::kMarker), Bytes::npos);
   EXPECT_EQ(result.find("etc/passwd"), Bytes::npos);
-  EXPECT_EQ(value_at<float>(result, 124), 77.F) << "cal_max is kept";
+  EXPECT_EQ(read_at<float>(result, 124), 77.F) << "cal_max is kept";
 }
 
 TEST(BadUploads, MicronsAreShownInMillimetresAndKeptInTheFile) {
