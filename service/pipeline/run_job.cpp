@@ -49,7 +49,7 @@ double steps_of(const Part& part) {
 }
 
 double total_cost(const std::vector<Part>& parts, double isovalues, double voxels) {
-  double cost = kReadCost + kMeasureCost + isovalues * kSurfaceCost;
+  double cost = kReadCost + kMeasureCost + isovalues * kSurfaceCost / 2;
   for (const Part& part : parts) {
     cost += kStepCost * steps_of(part) + kMeasureCost + kWriteCost + isovalues * kSurfaceCost;
   }
@@ -78,9 +78,14 @@ class JobRun {
     original_ = loaded->volume;
 
     measure_original();
-    if (parts_.size() > 1) write_meshes(kOriginal, original_surfaces_);
+    const bool flat = !original_surfaces_.empty() && original_surfaces_.front().triangles.empty();
+    if (flat) warnings_.push_back("no-surface: the volume is one voxel thick, so it has no closed surface.");
+    if (parts_.size() > 1 && !flat) write_meshes(kOriginal, original_surfaces_);
     for (const Part& part : parts_) run_part(part);
-    write_report();
+    clock_.run("write", 0, [&](const Progress& progress) {
+      write_report();
+      progress(1);
+    });
     return std::move(results_);
   }
 
@@ -123,9 +128,10 @@ class JobRun {
                     middle_slices(*volume, description_.map), isovalues_);
     });
 
-    const std::vector<Mesh> surfaces = surfaces_of(*volume);
+    std::vector<Mesh> surfaces = surfaces_of(*volume);
     for (std::size_t which = 0; which < surfaces.size(); ++which)
       measure_surface(name, surfaces[which], which);
+    std::erase_if(surfaces, [](const Mesh& surface) { return surface.triangles.empty(); });
     write_meshes(name, surfaces);
     foliation_rows_.push_back(std::move(foliation));
   }
@@ -155,10 +161,11 @@ class JobRun {
     SurfaceRow row{method, isovalues_[which], original_measures_[which], {}, {}};
     clock_.run("surfaces", kSurfaceCost / 2 * voxels_, [&](const Progress& progress) {
       row.after = measure(surface);
+      if (original_surfaces_[which].triangles.empty()) return;
       if (surface.triangles.empty()) {
         warnings_.push_back("no-surface: " + method + " leaves nothing at isovalue " +
                             isovalue_text(isovalues_[which]) + ", so there is no file for it.");
-      } else if (!original_surfaces_[which].triangles.empty()) {
+      } else {
         row.moved = displacement(surface, original_surfaces_[which], progress);
       }
     });
@@ -176,6 +183,7 @@ class JobRun {
 
   void write_meshes_as(const MeshFormat& format, const std::string& method, const std::vector<Mesh>& surfaces,
                        const Progress& progress) {
+    if (surfaces.empty()) return;
     std::vector<std::span<const Mesh>> files;
     if (format.many_surfaces) {
       files.emplace_back(surfaces);
@@ -184,10 +192,7 @@ class JobRun {
     }
     for (const std::span<const Mesh> meshes : files) {
       std::vector<double> isovalues;
-      for (const Mesh& mesh : meshes) {
-        if (!mesh.triangles.empty()) isovalues.push_back(mesh.isovalue);
-      }
-      if (isovalues.empty()) continue;
+      for (const Mesh& mesh : meshes) isovalues.push_back(mesh.isovalue);
       const std::string suffix = format.many_surfaces ? "" : "_iso" + isovalue_text(isovalues.front());
       const auto file = new_result(method + suffix + "." + format.name, "surface", method, format.media_type);
       Result& result = results_.back();

@@ -1,0 +1,221 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "service/pipeline/pipeline.h"
+#include "tests/support/mesh_checks.h"
+#include "tests/support/nifti_maker.h"
+#include "tests/support/scratch_folder.h"
+
+namespace volsmooth {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::UnorderedElementsAre;
+
+constexpr double kRadius = 10, kVoxels = 33;
+
+/// A float ball of radius 10 mm on 1 mm voxels: intensity 100 - 5 (r - 10 mm) clamped to 0..200, so 100 is
+/// its surface.
+test::NiftiFile ball() {
+  test::NiftiFile file;
+  const auto edge = static_cast<std::int64_t>(kVoxels);
+  file.size = {edge, edge, edge};
+  file.datatype = 16;
+  file.srow = {1, 0, 0, -16, 0, 1, 0, -16, 0, 0, 1, -16};
+  file.voxels.clear();
+  for (std::int64_t z = 0; z < edge; ++z)
+    for (std::int64_t y = 0; y < edge; ++y)
+      for (std::int64_t x = 0; x < edge; ++x) {
+        const double r = std::hypot(double(x) - 16, double(y) - 16, double(z) - 16);
+        file.voxels.push_back(std::clamp(100 - 5 * (r - kRadius), 0.0, 200.0));
+      }
+  return file;
+}
+
+class RunJob : public testing::Test {
+ protected:
+  /// As an upload: written and verified.
+  ComputeTask task_for(const test::NiftiFile& input) {
+    const test::ByteVector bytes = test::bytes_of(input);
+    ComputeTask task;
+    task.volume_file = folder_.put("volume", {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+    task.volume.sha256 = "0123";
+    const auto facts = engine_.inspect(task.volume_file, {});
+    EXPECT_TRUE(facts) << facts.error().detail;
+    task.volume.facts = *facts;
+    task.output_dir = folder_ / "results";
+    std::filesystem::create_directory(task.output_dir);
+    task.order.parameters = {{"flow_time_mm2", 4.0}};
+    task.order.isovalues = std::vector{100.0};
+    return task;
+  }
+
+  std::vector<Result> run(
+      ComputeTask& task, const StageProgress& report = [](std::string_view, double) {}) {
+    const auto plan = engine_.plan(task.order, task.volume.facts);
+    EXPECT_TRUE(plan) << plan.error().detail;
+    task.parameters = plan->parameters;
+    auto results = engine_.compute(task, report);
+    EXPECT_TRUE(results) << results.error().detail;
+    return *results;
+  }
+
+  static std::vector<std::string> names_of(const std::vector<Result>& results) {
+    std::vector<std::string> names;
+    for (const Result& result : results) names.push_back(result.name);
+    return names;
+  }
+
+  nlohmann::json report() { return nlohmann::json::parse(std::ifstream(folder_ / "results/report.json")); }
+
+  Engine engine_ = make_engine({});
+  ScratchFolder folder_;
+};
+
+TEST_F(RunJob, MakesAVolumeASurfaceAPictureAndAReport) {
+  ComputeTask task = task_for(ball());
+  const auto results = run(task);
+  EXPECT_THAT(names_of(results), ElementsAre("mean-curvature-flow.nii.gz", "mean-curvature-flow.png",
+                                             "mean-curvature-flow_iso100.stl", "report.json"));
+  for (const Result& result : results)
+    EXPECT_GT(std::filesystem::file_size(task.output_dir / result.name), 100U);
+  EXPECT_EQ(results[0].media_type, "application/gzip");
+  EXPECT_EQ(results[0].frame, "RAS");
+  EXPECT_THAT(results[2].isovalues, ElementsAre(100.0));
+}
+
+TEST_F(RunJob, TheReportSaysHowTheBallShrank) {
+  ComputeTask task = task_for(ball());
+  run(task);
+  const auto document = report();
+  EXPECT_EQ(document["input"]["sha256"], "0123");
+  EXPECT_EQ(document["parameters"]["flow_time_mm2"], 4.0);
+  const auto& surface = document["surfaces"][0];
+  // A ball of radius R shrinks to sqrt(R^2 - 4t) = 9.165 mm; first order in space: 1 % of the radius.
+  const double before = kRadius, after = std::sqrt(kRadius * kRadius - 16);
+  EXPECT_NEAR(surface["area_mm2"]["before"], 4 * std::numbers::pi * before * before, 15);
+  EXPECT_NEAR(surface["area_mm2"]["after"], 4 * std::numbers::pi * after * after, 0.02 * 1055);
+  EXPECT_NEAR(surface["displacement_mm"]["mean"], after - before, 0.01 * kRadius);
+  EXPECT_NEAR(surface["curvature_per_mm"]["mean"]["after"], 2 / after, 0.03 * 2 / after);
+  EXPECT_EQ(surface["euler_characteristic"]["after"], 2);
+  EXPECT_EQ(surface["closed"], true);
+  const auto& foliation = document["foliation"][0];
+  EXPECT_LT(foliation["area"]["after"], foliation["area"]["before"]);
+  EXPECT_EQ(foliation["rounding_rms"], 0);  // float in, float out
+}
+
+TEST_F(RunJob, CompareSetsTheLaplacianAndTheOriginalSurfacesBeside) {
+  ComputeTask task = task_for(ball());
+  task.order.method = "compare";
+  task.order.mesh_formats = {"ply", "glb"};
+  EXPECT_THAT(names_of(run(task)),
+              UnorderedElementsAre("original_iso100.ply", "original.glb", "mean-curvature-flow.nii.gz",
+                                   "mean-curvature-flow.png", "mean-curvature-flow_iso100.ply",
+                                   "mean-curvature-flow.glb", "laplacian.nii.gz", "laplacian.png",
+                                   "laplacian_iso100.ply", "laplacian.glb", "report.json"));
+  EXPECT_THAT(report()["foliation"].size(), 2);
+  EXPECT_EQ(report()["surfaces"][0]["area_mm2"]["before"], report()["surfaces"][1]["area_mm2"]["before"]);
+}
+
+TEST_F(RunJob, ASurfaceThatVanishesGivesNoFileButAWarning) {
+  ComputeTask task = task_for(ball());
+  // 140 is a ball of 2 mm, gone at t = 1; 100 stays.
+  task.order.isovalues = std::vector{100.0, 140.0};
+  task.order.mesh_formats = {"stl", "glb"};
+  const auto results = run(task);
+  EXPECT_THAT(names_of(results), UnorderedElementsAre("mean-curvature-flow.nii.gz", "mean-curvature-flow.png",
+                                                      "mean-curvature-flow_iso100.stl",
+                                                      "mean-curvature-flow.glb", "report.json"));
+  for (const Result& result : results) {
+    if (result.many_surfaces) {
+      EXPECT_THAT(result.isovalues, ElementsAre(100.0));
+    }
+  }
+  const auto glb = test::bytes_of_file(task.output_dir / "mean-curvature-flow.glb");
+  EXPECT_THAT(glb, HasSubstr("iso100"));
+  EXPECT_THAT(glb, testing::Not(HasSubstr("iso140")));
+  EXPECT_THAT(report()["warnings"].dump(), HasSubstr("no-surface"));
+  EXPECT_EQ(report()["surfaces"][1]["triangles"], 0);
+  EXPECT_TRUE(report()["surfaces"][1]["displacement_mm"].is_null());
+}
+
+TEST_F(RunJob, NoIsovaluesMeanNoSurfaces) {
+  ComputeTask task = task_for(ball());
+  task.order.isovalues = std::vector<double>{};
+  EXPECT_THAT(names_of(run(task)),
+              ElementsAre("mean-curvature-flow.nii.gz", "mean-curvature-flow.png", "report.json"));
+  EXPECT_THAT(report()["surfaces"], IsEmpty());
+}
+
+TEST_F(RunJob, AnAutomaticIsovalueLiesInside) {
+  ComputeTask task = task_for(ball());
+  task.order.isovalues.reset();
+  run(task);
+  const double isovalue = report()["surfaces"][0]["isovalue"];
+  EXPECT_GT(isovalue, 0);
+  EXPECT_LT(isovalue, 200);
+}
+
+TEST_F(RunJob, TheMeshIsInTheFrameAskedFor) {
+  ComputeTask task = task_for(ball());
+  task.order.mesh_formats = {"stl"};
+  std::vector<test::TriangleSoup> soups;
+  for (const char* frame : {"RAS", "LPS"}) {
+    task.order.mesh_frame = frame;
+    EXPECT_EQ(run(task)[2].frame, frame);
+    soups.push_back(test::read_stl(task.output_dir / "mean-curvature-flow_iso100.stl"));
+  }
+  ASSERT_EQ(soups[0].triangles.size(), soups[1].triangles.size());
+  // The same triangles in the same order, turned half round the z axis, which keeps their orientation.
+  for (std::size_t t = 0; t < soups[0].triangles.size(); ++t) {
+    for (std::size_t corner = 0; corner < 3; ++corner) {
+      const Float3 ras = soups[0].triangles[t][corner], lps = soups[1].triangles[t][corner];
+      EXPECT_EQ(lps, (Float3{-ras[0], -ras[1], ras[2]}));
+    }
+  }
+}
+
+TEST_F(RunJob, CanBeCancelledInEveryStage) {
+  for (const char* stage : {"read", "flow", "surfaces", "write"}) {
+    ComputeTask task = task_for(ball());
+    task.parameters = engine_.plan(task.order, task.volume.facts)->parameters;
+    const StageProgress cancel = [&](std::string_view at, double) {
+      if (at == stage) throw Cancelled();
+    };
+    EXPECT_THROW(static_cast<void>(engine_.compute(task, cancel)), Cancelled) << stage;
+  }
+}
+
+TEST_F(RunJob, ProgressStaysWithinTheWholeAndReachesItsEnd) {
+  ComputeTask task = task_for(ball());
+  std::atomic<double> largest = 0;
+  run(task, [&](std::string_view, double fraction) {
+    EXPECT_GE(fraction, 0);
+    EXPECT_LE(fraction, 1 + 1e-9);
+    for (double seen = largest; fraction > seen && !largest.compare_exchange_weak(seen, fraction);) {
+    }
+  });
+  EXPECT_GT(largest, 0.9);
+}
+
+TEST(Inspect, AShearedGridIsRefused) {
+  const ScratchFolder folder;
+  test::NiftiFile file;
+  file.srow = {1, 0.2, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+  const auto bytes = test::bytes_of(file);
+  const auto path = folder.put("volume", {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  const auto facts = make_engine({}).inspect(path, {});
+  ASSERT_FALSE(facts);
+  EXPECT_EQ(facts.error().slug, "unsupported-geometry");
+}
+
+}  // namespace
+}  // namespace volsmooth
