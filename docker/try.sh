@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # docker/try.sh [HEAD.nii.gz]: builds the image, runs it as compose.yaml does (read-only root, no capabilities), smooths
-# a real head in it with the client, checks the files that come out, and removes all but the image. With Docker where
-# its engine runs; else with podman, which is installed on Debian, and a base image made by debootstrap should no
-# registry be in reach. The head defaults to that of Debian's package mricron-data.
+# a real head in it with the client, checks the files that come out, and removes all but the image and the layers it is
+# built from. With Docker where its engine runs; else with podman, which is installed on Debian, and with a base image
+# made by debootstrap should no registry be in reach. The head defaults to that of Debian's package mricron-data.
 set -euo pipefail
-head_file=$(realpath "${1:-/usr/share/mricron/templates/ch2.nii.gz}")
+head_file=$(realpath -m "${1:-/usr/share/mricron/templates/ch2.nii.gz}")
 cd "$(dirname "$0")/.."
 source client/setup.sh
 
@@ -100,7 +100,7 @@ check_files() {
   done
 }
 
-# --- the engine
+# --- The image
 
 [[ -r $head_file ]] || need mricron-data
 [[ -r $head_file ]] || die "there is no $head_file"
@@ -125,7 +125,7 @@ else
   build_with_podman || die "podman build failed; the lines above say why"
 fi
 
-# --- the image at work
+# --- At work
 
 say "running it: read-only, without capabilities, on a port of this machine only"
 "${engine[@]}" run --detach --name "$container" "${limits[@]}" "${locked[@]}" --volume "$container:/data" \
@@ -135,18 +135,23 @@ port=$("${engine[@]}" port "$container" 8742/tcp | sed -n '1s/.*://p')
 [[ $(status "127.0.0.1:$port") == 200 ]] || die "the published port 127.0.0.1:$port did not answer /healthz with 200"
 [[ $(status elsewhere.example) == 4?? ]] || die "a foreign Host header was served; it is to be refused"
 
+label=$("${engine[@]}" image inspect --format '{{index .Config.Labels "org.opencontainers.image.version"}}' "$image")
+[[ $(client --version) == *" $label" ]] ||
+  die "docker/Dockerfile labels the image $label, but it holds $(client --version): set its VERSION"
+
 say "smoothing $head_file"
-client smooth ch2.nii.gz -o out --method compare --feature-radius 2mm --isovalue 40,90 --mesh stl,glb
+client smooth ch2.nii.gz -o out --method compare --feature-radius 2mm --isovalue 40,90 --mesh stl,glb ||
+  die "the client failed in the container; its line above says why"
 check_files
 
 say "stopping it and starting it again: what it holds is in the volume"
 kept=$(client upload ch2.nii.gz --json | sed -n 's/.*"id": *"\([^"]*\)".*/\1/p')
-"${engine[@]}" stop --time 30 "$container" >/dev/null
+"${engine[@]}" stop -t 30 "$container" >/dev/null
 ended=$("${engine[@]}" inspect --format '{{.State.ExitCode}}' "$container")
 ((ended == 0)) || die "SIGTERM was to end the daemon with 0, not $ended"
 "${engine[@]}" start "$container" >/dev/null
 wait_until_healthy
-client volumes | grep -q "$kept" || die "the volume uploaded before the restart is gone"
+[[ -n $kept && $(client volumes) == *"$kept"* ]] || die "the volume uploaded before the restart is gone"
 
 say "all is well"
 printf '%s files, image %s, %s MB\n' "$(find "$work/out" -type f | wc -l)" "$image" \
