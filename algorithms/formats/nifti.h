@@ -23,8 +23,8 @@ struct ReadLimits {
 };
 
 struct ReadOptions {
-  std::optional<std::int64_t> volume_index;  ///< which volume of a 4-D file, from 0
-  std::optional<float> non_finite;           ///< takes the place of NaN and infinite voxels
+  std::optional<std::int64_t> volume_index = {};  ///< which volume of a 4-D file, from 0
+  std::optional<float> non_finite = {};           ///< takes the place of NaN and infinite voxels
   ReadLimits limits = {};
 };
 

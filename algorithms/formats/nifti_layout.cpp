@@ -130,11 +130,18 @@ constexpr Refused (*kChecks[])(const NiftiFields&, const ReadOptions&) = {
     [](const NiftiFields& fields, const ReadOptions&) { return check_orientation(fields); },
 };
 
+/// Without what is only rounding of zero: the decomposition by which itk::Image inverts its directions fails
+/// on it.
 VoxelToWorld map_in_mm(const NiftiFields& fields) {
+  constexpr double kRounding = 1e-12;
   VoxelToWorld map = map_of(fields);
+  const Vector3 spacing = spacing_of(map);
   const double unit = mm_per_unit(fields);
   for (std::size_t row = 0; row < 3; ++row) {
-    for (double& entry : map.linear[row]) entry *= unit;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      double& entry = map.linear[row][axis];
+      entry = std::abs(entry) > kRounding * spacing[axis] ? unit * entry : 0;
+    }
     map.origin[row] *= unit;
   }
   return map;

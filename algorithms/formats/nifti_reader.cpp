@@ -27,11 +27,14 @@ Refusal trailing() {
   return {"nifti-trailing-data", "Bytes follow the voxels that the header declares."};
 }
 
-/// The length of a file that is not compressed is known before any voxel is read.
+/// The length of a file that is not compressed is known before anything is allocated, and for gzip a bound.
 std::optional<Refusal> check_length(const ByteSource& source, const NiftiLayout& layout) {
-  if (source.is_gzip()) return std::nullopt;
-  const std::int64_t payload = source.file_size() - layout.data_offset;
+  constexpr std::int64_t kMostInflation = 1032;  // of deflate: 258 bytes from two bits
   const std::int64_t declared = layout.volumes * layout.volume_bytes;
+  if (source.is_gzip()) {
+    return declared / kMostInflation > source.file_size() ? std::optional(truncated()) : std::nullopt;
+  }
+  const std::int64_t payload = source.file_size() - layout.data_offset;
   if (payload < declared) return truncated();
   if (payload > declared) return trailing();
   return std::nullopt;
