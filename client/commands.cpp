@@ -4,6 +4,7 @@
 
 #include "client/catalogue.h"
 #include "client/names.h"
+#include "client/printable.h"
 #include "client/smooth.h"
 #include "client/tables.h"
 
@@ -49,10 +50,18 @@ Expected<void> jobs(const Options& options, const Session& session) {
   return print(session, session.api.jobs(options.query), jobs_text);
 }
 
+/// An id does not say of what it is: the failure when it is neither a job's nor a volume's.
+Failure neither(const std::string& id, const Failure& failure) {
+  if (failure.code != ExitCode::kNoInput) return failure;
+  return {failure.code, "There is no job or volume " + printable(id) + ", or no longer.", failure.problem};
+}
+
 Expected<void> show(const Options& options, const Session& session) {
   const auto job = session.api.job(options.id);
   if (job || job.error().code != ExitCode::kNoInput) return print(session, job, job_text);
-  return print(session, session.api.volume(options.id), volume_text);
+  const auto volume = session.api.volume(options.id);
+  if (!volume) return tl::unexpected(neither(options.id, volume.error()));
+  return print(session, volume, volume_text);
 }
 
 Expected<void> wait(const Options& options, const Session& session) {
@@ -81,7 +90,9 @@ Expected<void> fetch(const Options& options, const Session& session) {
 Expected<void> remove(const Options& options, const Session& session) {
   const auto deleted = session.api.delete_job(options.id);
   if (deleted || deleted.error().code != ExitCode::kNoInput) return deleted;
-  return session.api.delete_volume(options.id);
+  const auto volume_deleted = session.api.delete_volume(options.id);
+  if (!volume_deleted) return tl::unexpected(neither(options.id, volume_deleted.error()));
+  return {};
 }
 
 Expected<void> methods(const Options&, const Session& session) {

@@ -14,6 +14,7 @@ namespace {
 constexpr long kConnectSeconds = 10;
 constexpr long kStalled =
     300;  ///< seconds without a byte; verifying a large upload takes a good part of a minute
+constexpr long kBufferBytes = 1L << 18;
 constexpr std::size_t kMaxDocument = std::size_t{64} << 20;  ///< bytes; documents are kept in memory
 
 /// What the callbacks of one transfer share.
@@ -110,6 +111,7 @@ struct HttpClient::Handles {
     curl_easy_setopt(easy, CURLOPT_LOW_SPEED_TIME, kStalled);
     curl_easy_setopt(easy, CURLOPT_TIMEOUT, static_cast<long>(request.timeout.count()));
     curl_easy_setopt(easy, CURLOPT_USERAGENT, "volsmooth/" VOLSMOOTH_VERSION);
+    curl_easy_setopt(easy, CURLOPT_BUFFERSIZE, kBufferBytes);
     curl_easy_setopt(easy, CURLOPT_WRITEFUNCTION, on_body);
     curl_easy_setopt(easy, CURLOPT_WRITEDATA, &transfer);
     set_body(transfer);
@@ -122,7 +124,7 @@ struct HttpClient::Handles {
     if (request.file != nullptr) {
       curl_easy_setopt(easy, CURLOPT_POST, 1L);
       curl_easy_setopt(easy, CURLOPT_POSTFIELDSIZE_LARGE, static_cast<curl_off_t>(request.file->bytes));
-      curl_easy_setopt(easy, CURLOPT_UPLOAD_BUFFERSIZE, 1L << 18);
+      curl_easy_setopt(easy, CURLOPT_UPLOAD_BUFFERSIZE, kBufferBytes);
       curl_easy_setopt(easy, CURLOPT_READFUNCTION, on_read);
       curl_easy_setopt(easy, CURLOPT_READDATA, &transfer);
     } else if (request.method == "POST") {

@@ -13,6 +13,15 @@ using Json = nlohmann::json;
 /// How long a request waits for the job's end: short with a bar, which gets its news from the answers.
 constexpr std::chrono::seconds kBarWait{1}, kQuietWait{30};
 
+/// How long a server that has answered before may be away, and how often it is asked.
+constexpr std::chrono::seconds kPatience{30};
+constexpr std::chrono::milliseconds kRetryPause{500};
+
+bool may_pass(const Failure& failure, const Session& session) {
+  const bool is_away = failure.code == ExitCode::kUnreachable || failure.code == ExitCode::kTryLater;
+  return is_away && !session.server_is_private;
+}
+
 bool is_final(const std::string& state) {
   return state != "queued" && state != "running";
 }
@@ -71,9 +80,17 @@ Expected<Json> upload_volume(const Session& session, const std::filesystem::path
 Expected<Json> wait_for_end(const Session& session, const std::string& id, const std::string& what) {
   ProgressBar bar(!session.console.quiet);
   std::string stage;
+  auto answered = std::chrono::steady_clock::now() - kPatience;
   for (;;) {
     auto job = session.api.wait(id, bar.is_shown() ? kBarWait : kQuietWait);
+    const auto now = std::chrono::steady_clock::now();
+    if (!job && may_pass(job.error(), session) && now - answered < kPatience) {
+      session.console.note(job.error().sentence);
+      session.interruption.waited(kRetryPause);
+      continue;
+    }
     if (!job || is_final(job->at("state").get<std::string>())) return job;
+    answered = now;
     const ProgressView view = view_of(what, *job);
     if (view.stage != stage) session.console.note(what + ": " + view.stage);
     stage = view.stage;

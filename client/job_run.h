@@ -16,6 +16,7 @@ namespace volsmooth {
 struct Session {
   Api& api;
   const Console& console;
+  const Interruption& interruption;
   bool server_is_private = false;  ///< nobody else will ask for what is on it
 };
 
@@ -23,7 +24,8 @@ struct Session {
 Expected<nlohmann::json> upload_volume(const Session& session, const std::filesystem::path& input,
                                        const Query& query);
 
-/// Waits until the job is final and gives its document. `what` names it in the progress bar.
+/// Waits until the job is final and gives its document. `what` names it in the progress bar. A server that
+/// goes away meanwhile gets half a minute to come back, as jobs outlive it.
 Expected<nlohmann::json> wait_for_end(const Session& session, const std::string& id, const std::string& what);
 
 /// Nothing for a succeeded job; for another why it has no results: kBadData or kInternal as its problem says,

@@ -1,3 +1,5 @@
+#include <fcntl.h>
+
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -35,7 +37,7 @@ Expected<void> run_on(const ServerAddress& server, bool is_private, const Option
   HttpClient http(server, is_private ? "" : *token, interruption,
                   [&](const std::string& line) { console.note(line); });
   Api api(http);
-  return run_command(options, Session{api, console, is_private});
+  return run_command(options, Session{api, console, interruption, is_private});
 }
 
 Expected<void> run_privately(const Options& options, const Console& console,
@@ -83,11 +85,21 @@ ExitCode run_and_tell(const Options& options) {
   return outcome.error().code;
 }
 
+/// Started without standard streams, files that are opened would take their numbers and get what is printed.
+void keep_standard_streams_open() {
+  while (true) {
+    Descriptor descriptor(open("/dev/null", O_RDWR));
+    if (!descriptor || descriptor.get() > STDERR_FILENO) return;
+    descriptor.release();
+  }
+}
+
 }  // namespace
 }  // namespace volsmooth
 
 int main(int argc, char** argv) {
   using namespace volsmooth;
+  keep_standard_streams_open();
   std::signal(SIGPIPE,
               SIG_IGN);  // a reader of our output that goes away must not leave a private daemon behind
   const auto options = parse_command_line({argv + 1, argv + argc});

@@ -14,6 +14,7 @@ namespace {
 
 constexpr int kBarWidth = 24;
 constexpr double kMegabyte = 1e6;
+constexpr std::chrono::milliseconds kDrawInterval{50};
 
 std::string padded(std::string text, std::size_t width) {
   text.resize(std::max(text.size(), width), ' ');
@@ -70,16 +71,16 @@ ProgressView view_of_transfer(const std::string& what, const std::string& stage,
 ProgressBar::ProgressBar(bool wanted) : shown_(wanted && isatty(STDERR_FILENO) == 1) {}
 
 void ProgressBar::show(const ProgressView& view) {
-  if (!shown_) return;
-  const std::string line = bar_line(view, terminal_columns() - 1);
-  if (line == line_) return;
-  std::fprintf(stderr, "\r%s\x1b[K", line.c_str());
-  line_ = line;
+  const auto now = std::chrono::steady_clock::now();
+  if (!shown_ || (view.stage == stage_ && now - drawn_ < kDrawInterval)) return;
+  std::fprintf(stderr, "\r%s\x1b[K", bar_line(view, terminal_columns() - 1).c_str());
+  stage_ = view.stage;
+  drawn_ = now;
 }
 
 void ProgressBar::wipe() {
-  if (!line_.empty()) std::fputs("\r\x1b[K", stderr);
-  line_.clear();
+  if (!stage_.empty()) std::fputs("\r\x1b[K", stderr);
+  stage_.clear();
 }
 
 }  // namespace volsmooth

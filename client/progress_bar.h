@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -37,7 +38,8 @@ class ProgressBar {
 
  private:
   bool shown_;
-  std::string line_;
+  std::string stage_;  ///< empty: there is no line
+  std::chrono::steady_clock::time_point drawn_;
 };
 
 }  // namespace volsmooth

@@ -3,31 +3,13 @@
 #include <algorithm>
 #include <initializer_list>
 
-#include "client/printable.h"
+#include "client/json_text.h"
 
 namespace volsmooth {
 namespace {
 
 using Json = nlohmann::json;
 using Row = std::vector<std::string>;
-
-/// A value as a person writes it: text without quotes, lists with spaces, nothing as "-".
-std::string text_of(const Json& value) {
-  if (value.is_null()) return "-";
-  if (value.is_string()) return value.get<std::string>();
-  if (!value.is_array()) return value.dump();
-  std::string text;
-  for (const Json& part : value) {
-    if (!text.empty()) text += ' ';
-    text += text_of(part);
-  }
-  return text;
-}
-
-std::string member(const Json& document, const char* name) {
-  const auto found = document.find(name);
-  return found == document.end() ? "-" : text_of(*found);
-}
 
 std::string percent(const Json& job) {
   return std::to_string(static_cast<int>(job.at("progress").at("fraction").get<double>() * 100)) + " %";
@@ -36,8 +18,8 @@ std::string percent(const Json& job) {
 std::vector<Row> members(const Json& document, std::initializer_list<const char*> names) {
   std::vector<Row> rows;
   for (const char* name : names) {
-    const std::string text = member(document, name);
-    if (text != "-" && !text.empty()) rows.push_back({name, text});
+    const std::string text = member_text(document, name);
+    if (!text.empty()) rows.push_back({name, text});
   }
   return rows;
 }
@@ -56,7 +38,7 @@ std::string table_text(const std::vector<Row>& rows) {
   for (const Row& row : rows) {
     std::string line;
     for (std::size_t column = 0; column < row.size(); ++column) {
-      line += printable(row[column]) + std::string(widths[column] - row[column].size() + 2, ' ');
+      line += row[column] + std::string(widths[column] - row[column].size() + 2, ' ');
     }
     line.erase(line.find_last_not_of(' ') + 1);
     text += line + '\n';
@@ -67,9 +49,9 @@ std::string table_text(const std::vector<Row>& rows) {
 std::string volumes_text(const Json& document) {
   std::vector<Row> rows = {{"ID", "FORMAT", "SIZE", "SPACING MM", "VOXELS", "BYTES", "CREATED"}};
   for (const Json& volume : document.at("volumes")) {
-    rows.push_back({member(volume, "id"), member(volume, "format"), member(volume, "size"),
-                    member(volume, "spacing_mm"), member(volume, "voxel_type"), member(volume, "bytes"),
-                    member(volume, "created_at")});
+    rows.push_back({member_text(volume, "id"), member_text(volume, "format"), member_text(volume, "size"),
+                    member_text(volume, "spacing_mm"), member_text(volume, "voxel_type"),
+                    member_text(volume, "bytes"), member_text(volume, "created_at")});
   }
   return table_text(rows);
 }
@@ -77,25 +59,24 @@ std::string volumes_text(const Json& document) {
 std::string jobs_text(const Json& document) {
   std::vector<Row> rows = {{"ID", "STATE", "DONE", "METHOD", "CREATED", "LABEL"}};
   for (const Json& job : document.at("jobs")) {
-    rows.push_back({member(job, "id"), member(job, "state"), percent(job), member(job, "method"),
-                    member(job, "created_at"), member(job, "label")});
+    rows.push_back({member_text(job, "id"), member_text(job, "state"), percent(job),
+                    member_text(job, "method"), member_text(job, "created_at"), member_text(job, "label")});
   }
-  const std::string cursor = member(document, "next_cursor");
-  const bool more = cursor != "-" && !cursor.empty();
-  return table_text(rows) + (more ? "more with --cursor " + printable(cursor) + '\n' : "");
+  const std::string cursor = member_text(document, "next_cursor");
+  return table_text(rows) + (cursor.empty() ? "" : "more with --cursor " + cursor + '\n');
 }
 
 std::string job_text(const Json& job) {
   std::vector<Row> rows =
       members(job, {"id", "state", "method", "label", "created_at", "started_at", "finished_at"});
-  rows.push_back({"progress", percent(job) + ", " + member(job.at("progress"), "stage")});
+  rows.push_back({"progress", percent(job) + ", " + member_text(job.at("progress"), "stage")});
   for (const auto& [name, value] : job.at("parameters").items()) rows.push_back({name, text_of(value)});
   if (const Json& error = job.at("error"); error.is_object())
-    rows.push_back({"error", member(error, "detail")});
+    rows.push_back({"error", member_text(error, "detail")});
   std::vector<Row> results;
   for (const Json& result : job.at("results")) {
-    results.push_back(
-        {"  " + member(result, "name"), member(result, "bytes") + " bytes", member(result, "media_type")});
+    results.push_back({"  " + member_text(result, "name"), member_text(result, "bytes") + " bytes",
+                       member_text(result, "media_type")});
   }
   return table_text(rows) + (results.empty() ? "" : "results\n" + table_text(results));
 }
@@ -104,7 +85,7 @@ std::string volume_text(const Json& volume) {
   std::vector<Row> rows = members(volume, {"id", "format", "size", "spacing_mm", "frame", "voxel_type",
                                            "bytes", "sha256", "created_at", "expires_at"});
   const Json intensity = volume.value("intensity", Json::object());
-  rows.push_back({"intensity", member(intensity, "min") + " to " + member(intensity, "max")});
+  rows.push_back({"intensity", member_text(intensity, "min") + " to " + member_text(intensity, "max")});
   for (const Json& warning : volume.value("warnings", Json::array()))
     rows.push_back({"warning", text_of(warning)});
   return table_text(rows);

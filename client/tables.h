@@ -6,7 +6,7 @@
 
 namespace volsmooth {
 
-/// Rows of equal length in aligned columns, a line each; what a terminal would obey is made harmless.
+/// Rows in aligned columns, a line each.
 std::string table_text(const std::vector<std::vector<std::string>>& rows);
 
 std::string volumes_text(const nlohmann::json& document);  ///< of GET /v1/volumes

@@ -3,6 +3,7 @@
 
 #include "client/catalogue.h"
 #include "client/console.h"
+#include "client/json_text.h"
 #include "client/printable.h"
 #include "client/progress_bar.h"
 #include "client/tables.h"
@@ -38,8 +39,15 @@ TEST(Progress, IsReadFromAJob) {
   EXPECT_FALSE(view.eta_seconds);
 }
 
-TEST(Tables, AlignColumnsAndObeyNobody) {
-  EXPECT_EQ(table_text({{"ID", "LABEL"}, {"j1234", "a\x1b[2Jb"}}), "ID     LABEL\nj1234  a?[2Jb\n");
+TEST(Tables, AlignColumns) {
+  EXPECT_EQ(table_text({{"ID", "LABEL"}, {"j1234", ""}, {"j1", "mine"}}),
+            "ID     LABEL\nj1234\nj1     mine\n");
+}
+
+TEST(JsonText, IsForAPersonAndObeysNobody) {
+  EXPECT_EQ(text_of(Json::parse(R"([1.0, 0.25, 7, "a\u001b[2Jb", null, true])")), "1 0.25 7 a?[2Jb  true");
+  EXPECT_EQ(member_text({{"a", 2.0}}, "a"), "2");
+  EXPECT_EQ(member_text({{"a", 2.0}}, "b"), "");
 }
 
 TEST(Tables, ShowJobsAndWhereTheyGoOn) {
@@ -48,7 +56,7 @@ TEST(Tables, ShowJobsAndWhereTheyGoOn) {
       "method": "compare", "created_at": "2026-11-22T04:00:00Z", "label": null}], "next_cursor": "c2"})");
   EXPECT_EQ(jobs_text(document),
             "ID  STATE    DONE  METHOD   CREATED               LABEL\n"
-            "j1  running  41 %  compare  2026-11-22T04:00:00Z  -\n"
+            "j1  running  41 %  compare  2026-11-22T04:00:00Z\n"
             "more with --cursor c2\n");
 }
 

@@ -66,7 +66,7 @@ class Smooth : public testing::Test {
     HttpClient http(*parse_server(server_.url()), "", interruption_);
     Api api(http);
     testing::internal::CaptureStdout();
-    auto outcome = smooth(options, Session{api, Console{.quiet = true}});
+    auto outcome = smooth(options, Session{api, Console{.quiet = true}, interruption_});
     std::fflush(stdout);
     printed_ = testing::internal::GetCapturedStdout();
     return outcome;
@@ -109,6 +109,18 @@ TEST_F(Smooth, WaitsUntilTheJobHasEnded) {
   waited_ = [&] { return canned(200, ++asked < 3 ? job("running").dump() : end_.dump()); };
   EXPECT_TRUE(run());
   EXPECT_EQ(asked, 3);
+}
+
+TEST_F(Smooth, WaitsForAServerThatComesBack) {
+  int asked = 0;
+  waited_ = [&] {
+    ++asked;
+    if (asked == 2) return CannedAnswer{};
+    if (asked == 3) return canned(503, R"({"type": "/problems/stopping"})");
+    return canned(200, (asked < 4 ? job("running") : end_).dump());
+  };
+  EXPECT_TRUE(run());
+  EXPECT_EQ(asked, 4);
 }
 
 TEST_F(Smooth, RefusesTakenNamesBeforeAnythingIsSent) {
