@@ -71,6 +71,7 @@ const json& fixed_schemas() {
         "state": {"enum": ["queued", "running", "succeeded", "failed", "cancelled"]},
         "method": {"type": "string"},
         "parameters": {"$ref": "#/components/schemas/Parameters"},
+        "order": {"$ref": "#/components/schemas/JobOrder"},
         "progress": {"$ref": "#/components/schemas/Progress"},
         "label": {"type": ["string", "null"]},
         "created_at": {"type": "string", "format": "date-time"},

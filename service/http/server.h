@@ -11,9 +11,9 @@
 namespace volsmooth {
 
 struct ServerSettings {
-  std::string listen = "127.0.0.1:8742";  ///< ADDRESS:PORT (port 0: any free one) or unix:PATH
-  bool allow_open_network = false;        ///< whether to listen where others than this machine reach it
-  std::vector<std::string> host_names;    ///< by which it is addressed, beside localhost and the like
+  std::string listen = "127.0.0.1:8742";     ///< ADDRESS:PORT (port 0: any free one) or unix:PATH
+  bool allow_open_network = false;           ///< whether to listen where others than this machine reach it
+  std::vector<std::string> host_names = {};  ///< by which it is addressed, beside localhost and the like
   std::int64_t max_upload_bytes = std::int64_t{16} << 30;
   int max_connections = 1024;
 

@@ -1,0 +1,39 @@
+#include "service/http/host_check.h"
+
+#include <gtest/gtest.h>
+
+namespace volsmooth {
+namespace {
+
+struct Case {
+  std::vector<std::string> hosts;
+  std::string slug;  ///< empty: accepted
+};
+
+class HostCheck : public testing::TestWithParam<Case> {};
+
+TEST_P(HostCheck, GivesItsAnswer) {
+  Head head;
+  for (const auto& host : GetParam().hosts) head.fields.push_back({"host", host});
+  HostNames ours;
+  ours.names.push_back("volsmooth.hospital.example");
+  const auto checked = check_host(head, ours);
+  EXPECT_EQ(checked ? "" : checked.error().slug, GetParam().slug);
+}
+
+// malicious-input row H10.
+INSTANTIATE_TEST_SUITE_P(
+    Rows, HostCheck,
+    testing::Values(Case{{"localhost"}, ""}, Case{{"LocalHost:8742"}, ""}, Case{{"127.0.0.1:1"}, ""},
+                    Case{{"[::1]"}, ""}, Case{{"[::1]:8742"}, ""}, Case{{"volsmooth.hospital.example"}, ""},
+                    Case{{}, "bad-host"}, Case{{""}, "bad-host"},
+                    Case{{"localhost", "localhost"}, "bad-host"}, Case{{"localhost:"}, "bad-host"},
+                    Case{{"localhost:80x"}, "bad-host"}, Case{{"localhost:123456"}, "bad-host"},
+                    Case{{"[::1"}, "bad-host"}, Case{{"evil.example"}, "misdirected-request"},
+                    Case{{"localhost.evil.example"}, "misdirected-request"},
+                    Case{{"evil.example:8742"}, "misdirected-request"},
+                    Case{{"127.0.0.2"}, "misdirected-request"},
+                    Case{{"localhost, evil.example"}, "misdirected-request"}));
+
+}  // namespace
+}  // namespace volsmooth
