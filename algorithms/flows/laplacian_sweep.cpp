@@ -56,9 +56,10 @@ DiffuseRow diffuse_row_for(InstructionSet set) {
   }
 }
 
+/// Three planes of a tile fit the second-level cache; up to 280^2, that is three whole planes.
 TileShape cached_tile(const Size3& size) {
-  constexpr std::int64_t kVoxelsOfPlane = 32768;
-  return {.rows = std::clamp<std::int64_t>(kVoxelsOfPlane / size[0], 4, 512), .planes = 48};
+  constexpr std::int64_t kVoxelsOfPlane = 80000;
+  return {.rows = std::clamp<std::int64_t>(kVoxelsOfPlane / size[0], 4, 1024), .planes = 16};
 }
 
 }  // namespace

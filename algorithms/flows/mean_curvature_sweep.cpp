@@ -99,7 +99,7 @@ class Sweep {
 
 /// Tall enough that rows computed twice at a tile's rim count little, low enough for the second-level cache.
 TileShape cached_tile(const Size3& size) {
-  constexpr std::int64_t kVoxelsOfPlane = 6000;
+  constexpr std::int64_t kVoxelsOfPlane = 9000;
   return {.rows = std::clamp<std::int64_t>(kVoxelsOfPlane / size[0], 4, 64), .planes = 48};
 }
 

@@ -23,16 +23,17 @@ struct Rows {
 /// The sums of row (y, z): intensities, and lengths of the gradient.
 FoliationMeasures measure_row(const Rows& rows, const Vector3& per_mm, std::int64_t y, std::int64_t z) {
   const float* here = rows(y, z);
-  const float *south = rows(y - 1, z), *north = rows(y + 1, z), *below = rows(y, z - 1),
-              *above = rows(y, z + 1);
+  const float *south = rows(y - 1, z), *north = rows(y + 1, z);
+  const float *below = rows(y, z - 1), *above = rows(y, z + 1);
+  const std::int64_t last = rows.size[0] - 1;
   FoliationMeasures sums{.minimum = here[0], .maximum = here[0]};
-  for (std::int64_t x = 0; x < rows.size[0]; ++x) {
-    const double dx =
-        (double{here[reflected(x + 1, rows.size[0])]} - here[reflected(x - 1, rows.size[0])]) * per_mm[0];
+  for (std::int64_t x = 0; x <= last; ++x) {
+    const float left = here[x > 0 ? x - 1 : 0], right = here[x < last ? x + 1 : last];
+    const double dx = (double{right} - left) * per_mm[0];
     const double dy = (double{north[x]} - south[x]) * per_mm[1];
     const double dz = (double{above[x]} - below[x]) * per_mm[2];
     sums.area += std::sqrt(dx * dx + dy * dy + dz * dz);
-    sums.mass += here[x];
+    sums.mass += double{here[x]};
     sums.minimum = std::min(sums.minimum, here[x]);
     sums.maximum = std::max(sums.maximum, here[x]);
   }

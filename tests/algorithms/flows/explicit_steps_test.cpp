@@ -48,7 +48,7 @@ TEST_P(Flow, ReportsEveryTileAndEndsAtOne) {
     const std::lock_guard lock(mutex);
     fractions.push_back(fraction);
   });
-  // Tiles are 48 planes deep: three of them here, in each of five steps or more.
+  // Tiles are at most 48 planes deep: three of them or more here, in each of five steps or more.
   EXPECT_GE(fractions.size(), 3U * 5U);
   EXPECT_GE(std::ranges::min(fractions), 0);
   EXPECT_EQ(std::ranges::max(fractions), 1);

@@ -29,6 +29,10 @@ struct Case {
   TileShape tile;
 };
 
+void PrintTo(const Case& value, std::ostream* out) {
+  *out << value.flow.name;
+}
+
 std::vector<Case> cases() {
   const TileShape whole{64, 48}, small{3, 2}, single{1, 1};
   const std::pair<Grid, TileShape> grids[] = {
