@@ -99,13 +99,18 @@ WorkerPool::Work JobService::State::claim() {
 
 bool JobService::State::settle(const JobChange& change) {
   if (!jobs.change(change)) return false;
-  if (is_final(change.to))
-    if (const auto job = jobs.find(change.id)) tell_final(*job);
-  wakes.wake(change.id);
+  // The change stands; who cannot be told of it must not undo it.
+  try {
+    if (is_final(change.to))
+      if (const auto job = jobs.find(change.id)) tell_final(*job);
+    wakes.wake(change.id);
+  } catch (const std::exception& error) {
+    spdlog::error("job {}: news of it got lost: {}", change.id, error.what());
+  }
   return true;
 }
 
-void JobService::State::tell_final(const Job& job) {
+void JobService::State::tell_final(const Job& job) const {
   if (observer) observer(job);
 }
 

@@ -32,7 +32,7 @@ struct JobService::State {
   // Running jobs.
   WorkerPool::Work claim();
   bool settle(const JobChange& change);
-  void tell_final(const Job& job);
+  void tell_final(const Job& job) const;
 
   // Answers.
   /// Why there is nothing of that id: bad-id, gone or not-found.

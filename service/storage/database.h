@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
@@ -95,7 +96,7 @@ class Database {
     void operator()(sqlite3* connection) const;
   };
   std::unique_ptr<sqlite3, Close> connection_;
-  bool condemned_ = false;
+  std::atomic<bool> condemned_ = false;  // also read by other threads
 };
 
 /// All or nothing: what is not committed when it goes is undone. Of a reader: one state of the data.

@@ -39,6 +39,17 @@ FileDescriptor lock(const fs::path& root) {
   return file;
 }
 
+/// Gives `from` its name for good. When it is open whether the name would last, neither stays.
+void rename_durably(const fs::path& from, const fs::path& to) {
+  fs::rename(from, to);
+  try {
+    sync_path(to.parent_path());
+  } catch (...) {
+    fs::remove_all(to);
+    throw;
+  }
+}
+
 fs::path part_of(fs::path name) {
   return name += ".part";
 }
@@ -67,15 +78,8 @@ IncomingFile FileStore::receive() {
 
 void FileStore::adopt(IncomingFile file, const fs::path& name) {
   file.finish();
-  const fs::path target = root_ / name;
-  fs::rename(file.path(), target);
+  rename_durably(file.path(), root_ / name);
   file.release();
-  try {
-    sync_path(target.parent_path());
-  } catch (...) {
-    fs::remove(target);
-    throw;
-  }
 }
 
 fs::path FileStore::begin_directory(const fs::path& name) {
@@ -88,8 +92,7 @@ fs::path FileStore::begin_directory(const fs::path& name) {
 void FileStore::adopt_directory(const fs::path& name) {
   const fs::path part = root_ / part_of(name);
   sync_path(part);
-  fs::rename(part, root_ / name);
-  sync_path((root_ / name).parent_path());
+  rename_durably(part, root_ / name);
 }
 
 void FileStore::abandon_directory(const fs::path& name) {
