@@ -103,10 +103,10 @@ inline Bytes gzip_of_zeros(std::size_t megabytes) {
   return gzip(Bytes(megabytes << 20, '\0'), 9);
 }
 
-/// A header of 1000 x 1000 x 500 int16 voxels and as many zero bytes as it declares: 1 GB in 1 MB.
+/// A header of 1000 x 1000 x 200 int16 voxels and as many zero bytes as it declares: 400 MB in 0.4 MB.
 inline Bytes bomb() {
-  const Bytes head = edited(good().substr(0, kData), {dims(3, 1000, 1000, 500, 1, 1, 1, 1)});
-  return gzip(head + Bytes(1'000'000'000, '\0'), 9);
+  const Bytes head = edited(good().substr(0, kData), {dims(3, 1000, 1000, 200, 1, 1, 1, 1)});
+  return gzip(head + Bytes(400'000'000, '\0'), 6);
 }
 
 inline Bytes repeated(const Bytes& member, int count) {
@@ -217,7 +217,7 @@ inline std::vector<BadUpload> nifti_rows() {
          file.insert(kData, 4, '\0');
          return edited(file, {put(kVoxOffset, 356.F)});
        },
-       201, "", "", "unaligned-data"},
+       201, "", "", "offset-unaligned"},
       {"N24SlopeNan", good_with({put(kSclSlope, kNan)}), 422, "nifti-bad-scaling"},
       {"N24InterInf", good_with({put(kSclInter, kInf)}), 422, "nifti-bad-scaling"},
       {"N25SlopeOverflows", good_with({put(kSclSlope, 1e38F)}), 422, "nifti-bad-scaling"},
@@ -230,7 +230,7 @@ inline std::vector<BadUpload> nifti_rows() {
       {"N29QuaternionLong", good_with(qform(1, 1, 1)), 422, "nifti-bad-orientation"},
       {"N29QuaternionNan", good_with(qform(kNan, 0, 0)), 422, "nifti-bad-orientation"},
       {"N30FormsDisagree", good_with({put(kQformCode, int16_t{1}), put(kQuaternB, 1.F)}), 201, "", "",
-       "sform-qform-disagree"},
+       "forms-disagree"},
       {"N31NoOrientation", good_with({put(kSformCode, int16_t{0})}), 201, "", "", "orientation-unknown"},
       {"N32EsizeHuge", [] { return with_extensions(extension(0x7ffffff0), 368); }, 422,
        "nifti-bad-extension"},

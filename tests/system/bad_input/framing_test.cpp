@@ -48,7 +48,6 @@ std::vector<BadRequest> bad_requests() {
       {"H3Folded", post("Transfer-Encoding:\r\n chunked\r\n", chunk), {400}},
       {"H4Differing", post("Content-Length: 5\r\nContent-Length: 6\r\n", "hello"), {400}},
       {"H5Equal", post("Content-Length: 5\r\nContent-Length: 5\r\n", "hello"), {400}},
-      {"H6LongSize", post(chunked, "00000000000000005\r\nhello\r\n0\r\n\r\n"), {400}},
       {"H6HugeSize", post(chunked, "fffffffffffffffff\r\nhello\r\n0\r\n\r\n"), {400}},
       {"H6Hex", post(chunked, "0x5\r\nhello\r\n0\r\n\r\n"), {400}},
       {"H6Space", post(chunked, " 5\r\nhello\r\n0\r\n\r\n"), {400}},
@@ -61,26 +60,16 @@ std::vector<BadRequest> bad_requests() {
       {"H9Folded", get("/healthz", "X-A: a\r\n b\r\n"), {400}},
       {"H9SpaceBeforeColon", get("/healthz", "X-A : a\r\n"), {400}},
       {"H9EmptyName", get("/healthz", ": a\r\n"), {400}},
-      {"H10NoHost", "GET /healthz HTTP/1.1\r\n\r\n", {400}},
-      {"H10TwoHosts", get("/healthz", host()), {400}},
-      {"H10Foreign", "GET /healthz HTTP/1.1\r\nHost: example.org\r\n\r\n", {421}},
       {"H11LongHeader", get("/healthz", "X-A: " + std::string(9 << 10, 'a') + "\r\n"), {431}},
       {"H11ManyFields", get("/healthz", many_fields(101)), {431}},
       {"H11LongTarget", get("/" + std::string(8 << 10, 'a')), {414}},
-      {"H12HighByte", get("/v1/jobs/\xc3\xa9"), {400}},
       {"H12Nul", get(std::string("/v1/jobs/a\0b", 12)), {400}},
-      {"H12Space", get("/v1/jobs/a b"), {400}},
-      {"H12Star", get("*"), {400}},
       {"H14Http09", "GET /healthz\r\n\r\n", {400, 505}},
       {"H14Http12", "GET /healthz HTTP/1.2\r\n" + host() + "\r\n", {400, 505}},
       {"H14Http20", "GET /healthz HTTP/2.0\r\n" + host() + "\r\n", {400, 505}},
       {"H14Preface", "PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n", {400, 505}},
-      {"H15Trace", "TRACE /healthz HTTP/1.1\r\n" + host() + "\r\n", {405, 501}},
-      {"H15Connect", "CONNECT example.org:443 HTTP/1.1\r\n" + host() + "\r\n", {400, 405, 501}},
-      {"H15Garbage", "FROBNICATE /healthz HTTP/1.1\r\n" + host() + "\r\n", {400, 405, 501}},
       {"H16BogusExpect", post("Expect: bogus\r\nContent-Length: 5\r\n", "hello"), {417}},
       {"H17OverLimit", post("Content-Length: 9000000000000000000\r\n", "hello"), {413}},
-      {"H18NoLength", post("", ""), {411}},
       {"TlsHandshake",
        std::string("\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03", 11) + std::string(500, 'x'),
        {400}},
@@ -90,6 +79,37 @@ std::vector<BadRequest> bad_requests() {
     rows.push_back({"H4Length " + std::string(length),
                     post("Content-Length: " + std::string(length) + "\r\n", "hello"),
                     {400, 413}});
+  return rows;
+}
+
+/// Wrong, but there is no doubt where the request ends.
+std::vector<BadRequest> well_framed_mistakes() {
+  std::vector<BadRequest> rows = {
+      {"UnknownPath", get("/v1/nothing"), {404}},
+      {"H15WrongMethod", "DELETE /v1/methods HTTP/1.1\r\n" + host() + "\r\n", {405}},
+      {"H19NotJson",
+       "POST /v1/jobs HTTP/1.1\r\n" + host() + "Content-Type: text/plain\r\nContent-Length: 2\r\n\r\n{}",
+       {415}},
+      {"H24Accept", get("/v1/methods", "Accept: image/png\r\n"), {406}},
+      {"BadQuery", get("/v1/jobs?limit=many"), {400}},
+      {"H8Trailer",
+       post("Transfer-Encoding: chunked\r\n",
+            "5\r\nhello\r\n0\r\nContent-Length: 7\r\nAuthorization: x\r\n\r\n"),
+       {400, 415, 422}},
+      {"H6LongSize",
+       post("Transfer-Encoding: chunked\r\n", "00000000000000005\r\nhello\r\n0\r\n\r\n"),
+       {400, 415}},
+      {"H10NoHost", "GET /healthz HTTP/1.1\r\n\r\n", {400}},
+      {"H10TwoHosts", get("/healthz", host()), {400}},
+      {"H10Foreign", "GET /healthz HTTP/1.1\r\nHost: example.org\r\n\r\n", {421}},
+      {"H12HighByte", get("/v1/jobs/\xc3\xa9"), {400}},
+      {"H12Space", get("/v1/jobs/a b"), {400}},
+      {"H12Star", get("*"), {400}},
+      {"H15Trace", "TRACE /healthz HTTP/1.1\r\n" + host() + "\r\n", {405, 501}},
+      {"H15Connect", "CONNECT example.org:443 HTTP/1.1\r\n" + host() + "\r\n", {400, 405, 501}},
+      {"H15Garbage", "FROBNICATE /healthz HTTP/1.1\r\n" + host() + "\r\n", {400, 405, 501}},
+      {"H18NoLength", post("", ""), {411}},
+  };
   for (const char* target : {"/v1/jobs/../../admin", "/v1/jobs/%2e%2e%2fadmin", "/v1/jobs/a%2Fb", "//v1/jobs",
                              "/v1/jobs/a%00b", "/v1/jobs/%252e%252e", "/v1/jobs/%c0%ae"})
     rows.push_back({"H13 " + std::string(target), get(target), {400}});
@@ -114,37 +134,30 @@ TEST(BadFraming, IsRefusedAndClosesTheConnection) {
       EXPECT_EQ(answer->header("connection"), "close");
       EXPECT_FALSE(connection.read().has_value()) << "a second answer: desynchronised";
     }
-    EXPECT_TRUE(connection.closed_within(10));
+    EXPECT_TRUE(connection.closed_within(5));
     expect_alive();
   }
 }
 
-/// Wrong, but well framed: the connection goes on, and the next answer belongs to the next request.
-TEST(BadFraming, AWellFramedMistakeKeepsTheConnection) {
-  const std::vector<BadRequest> rows = {
-      {"UnknownPath", get("/v1/nothing"), {404}},
-      {"H15WrongMethod", "DELETE /v1/methods HTTP/1.1\r\n" + host() + "\r\n", {405}},
-      {"H19NotJson",
-       "POST /v1/jobs HTTP/1.1\r\n" + host() + "Content-Type: text/plain\r\nContent-Length: 2\r\n\r\n{}",
-       {415}},
-      {"H24Accept", get("/v1/methods", "Accept: image/png\r\n"), {406}},
-      {"BadQuery", get("/v1/jobs?limit=many"), {400}},
-      {"H8Trailer",
-       post("Transfer-Encoding: chunked\r\n",
-            "5\r\nhello\r\n0\r\nContent-Length: 7\r\nAuthorization: x\r\n\r\n"),
-       {415, 422}},
-  };
-  for (const auto& [name, bytes, statuses] : rows) {
+/// Either the connection is closed, or the next answer belongs to the next request.
+TEST(BadFraming, AWellFramedMistakeKeepsTheOrder) {
+  for (const auto& [name, bytes, statuses] : well_framed_mistakes()) {
     SCOPED_TRACE(name);
     HttpConnection connection(survivor().daemon().port());
-    connection.send(bytes + get("/healthz"));
+    connection.send(bytes + get("/healthz") + get("/v1/methods"));
     const auto answer = connection.read();
     ASSERT_TRUE(answer.has_value());
     EXPECT_THAT(statuses, testing::Contains(answer->status)) << answer->body;
-    if (answer->header("connection") == "close") continue;
-    const auto next = connection.read();
-    ASSERT_TRUE(next.has_value());
-    EXPECT_EQ(next->status, 200);
+    EXPECT_EQ(answer->header("content-type"), "application/problem+json");
+    if (answer->header("connection") == "close") {
+      EXPECT_TRUE(connection.closed_within(5));
+      continue;
+    }
+    const auto second = connection.read(), third = connection.read();
+    ASSERT_TRUE(second && third);
+    EXPECT_EQ(second->status, 200);
+    EXPECT_EQ(third->status, 200);
+    EXPECT_TRUE(third->document().contains("methods"));
   }
 }
 
