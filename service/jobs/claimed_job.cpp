@@ -41,7 +41,7 @@ bool ClaimedJob::settle_as(JobState to, JobProgress progress, std::optional<Prob
                            std::vector<Result> results) {
   progress.eta_seconds.reset();
   JobChange change{job_.id,  job_.attempt,     JobState::kRunning, to,
-                   progress, std::move(error), std::move(results), running_->events()};
+                   progress, std::move(error), std::move(results), running_->events_after({})};
   const bool first = settle_(change);
   if (!first && to != JobState::kCancelled) {
     // A cancel came before; if the job is gone altogether, this changes nothing either.

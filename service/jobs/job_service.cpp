@@ -203,8 +203,8 @@ tl::expected<std::vector<JobEvent>, Problem> JobService::events_after(std::strin
   // Memory first: when the attempt ends in between, the store has all of its events, so none is missed.
   std::map<EventNumber, JobEvent> events;
   if (const auto running = state_->running.find(job_id))
-    for (const NumberedEvent& event : running->events())
-      if (event.number > after) events.emplace(event.number, outside_view(event));
+    for (const NumberedEvent& event : running->events_after(after))
+      events.emplace(event.number, outside_view(event));
   if (!state_->jobs.find(job_id)) return state_->missing(job_id, "job");
   for (const NumberedEvent& event : state_->jobs.events_after(job_id, after))
     events.emplace(event.number, outside_view(event));

@@ -67,9 +67,10 @@ JobProgress RunningJob::progress() const {
   return progress_at(Clock::now());
 }
 
-std::vector<NumberedEvent> RunningJob::events() const {
+std::vector<NumberedEvent> RunningJob::events_after(EventNumber after) const {
   const std::lock_guard lock(mutex_);
-  return events_;
+  const auto first = std::ranges::upper_bound(events_, after, {}, &NumberedEvent::number);
+  return {first, events_.end()};
 }
 
 }  // namespace volsmooth

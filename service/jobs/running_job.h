@@ -30,7 +30,7 @@ class RunningJob {
   bool report(std::string_view stage, double fraction);
 
   JobProgress progress() const;
-  std::vector<NumberedEvent> events() const;
+  std::vector<NumberedEvent> events_after(EventNumber after) const;
 
  private:
   using Clock = std::chrono::steady_clock;

@@ -28,8 +28,8 @@ TEST_F(RunningJobTest, NeverFallsBack) {
 // One event a step of 2 %, one a change of stage, and the first: however many reports there are.
 TEST_F(RunningJobTest, TellsOnlyWhatIsWorthIt) {
   for (int i = 0; i <= 100'000; ++i) running_.report(i < 50'000 ? "flow" : "surfaces", i / 100'000.0);
-  EXPECT_GE(running_.events().size(), 40u);
-  EXPECT_LE(running_.events().size(), 53u);
+  EXPECT_GE(running_.events_after({}).size(), 40u);
+  EXPECT_LE(running_.events_after({}).size(), 53u);
 }
 
 TEST_F(RunningJobTest, EventsOfManyThreadsAreInOrder) {
@@ -40,9 +40,11 @@ TEST_F(RunningJobTest, EventsOfManyThreadsAreInOrder) {
         for (int i = 0; i <= 1000; ++i) running_.report("flow", i / 1000.0);
       });
   }
-  const auto events = running_.events();
+  const auto events = running_.events_after({});
   for (std::size_t i = 1; i < events.size(); ++i) EXPECT_LT(events[i - 1].number, events[i].number);
   EXPECT_EQ(running_.progress().fraction, 1);
+  EXPECT_EQ(running_.events_after(events[2].number).size(), events.size() - 3);
+  EXPECT_TRUE(running_.events_after(events.back().number).empty());
 }
 
 TEST_F(RunningJobTest, ThrowsOnceInterrupted) {
