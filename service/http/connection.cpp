@@ -6,14 +6,15 @@
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/beast/core/buffers_to_string.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
-#include <boost/beast/http/buffer_body.hpp>
 #include <boost/beast/http/chunk_encode.hpp>
 #include <boost/beast/http/empty_body.hpp>
 #include <boost/beast/http/parser.hpp>
-#include <boost/beast/http/read.hpp>
 #include <boost/beast/http/write.hpp>
 #include <chrono>
+#include <ctime>
 #include <sstream>
+
+#include "service/http/body_decoder.h"
 
 namespace volsmooth {
 namespace {
@@ -25,14 +26,20 @@ using boost::system::error_code;
 
 constexpr auto kAwait = asio::as_tuple(asio::use_awaitable);
 
-/// What is read at once; also the most that a chunk's head or a trailer can grow to.
 constexpr std::size_t kReadBytes = 65536;
-constexpr std::size_t kMaxChunkExtensionBytes = 256;
 constexpr double kDiscardSeconds = 2;
 
 std::chrono::steady_clock::duration in_seconds(double seconds) {
   return std::chrono::duration_cast<std::chrono::steady_clock::duration>(
       std::chrono::duration<double>(seconds));
+}
+
+/// Such as "Sun, 06 Nov 1994 08:49:37 GMT"; the process never leaves the C locale.
+std::string http_date(std::time_t time) {
+  std::tm utc{};
+  ::gmtime_r(&time, &utc);
+  char text[32];
+  return {text, std::strftime(text, sizeof text, "%a, %d %b %Y %H:%M:%S GMT", &utc)};
 }
 
 std::string_view text_of(const beast::flat_buffer& buffer) {
@@ -65,17 +72,9 @@ class Connection::Deadline {
 };
 
 struct Connection::Codec {
-  using Parser = http::request_parser<http::buffer_body>;
-
   beast::flat_buffer received{kReadBytes};
-  std::optional<Parser> parser;
   std::size_t head_bytes = 0;
-
-  /// Beast takes extensions of any length.
-  std::function<void(std::uint64_t, beast::string_view, error_code&)> check_extensions =
-      [](std::uint64_t, beast::string_view extensions, error_code& error) {
-        if (extensions.size() > kMaxChunkExtensionBytes) error = http::error::bad_chunk_extension;
-      };
+  BodyDecoder body{Head{}};
 };
 
 Connection::Connection(Socket socket)
@@ -111,33 +110,35 @@ asio::awaitable<tl::expected<std::string_view, ReadFailure>> Connection::read_he
   }
 }
 
-bool Connection::begin_body() {
-  auto& parser = codec_->parser.emplace();
-  parser.header_limit(static_cast<std::uint32_t>(kReadBytes));
+bool Connection::begin_body(const Head& head) {
+  http::request_parser<http::empty_body> parser;
+  parser.header_limit(2 * kMaxHeadBytes);
   parser.body_limit(boost::none);
-  parser.on_chunk_header(codec_->check_extensions);
   error_code error;
-  const auto head = asio::buffer(codec_->received.data(), codec_->head_bytes);
-  const auto used = parser.put(head, error);
+  const auto used = parser.put(asio::buffer(codec_->received.data(), codec_->head_bytes), error);
+  if (error || used != codec_->head_bytes || parser.chunked() != head.chunked) return false;
   codec_->received.consume(used);
-  return !error && used == codec_->head_bytes && parser.is_header_done();
+  codec_->body = BodyDecoder(head);
+  return true;
 }
 
 asio::awaitable<tl::expected<std::string_view, ReadFailure>> Connection::read_body(std::span<char> block,
                                                                                    double seconds_per_read) {
-  auto& parser = *codec_->parser;
-  auto& body = parser.get().body();
-  body.data = block.data();
-  body.size = block.size();
-  while (!parser.is_done() && body.size > 0) {
-    const Deadline deadline(*this, seconds_per_read);
-    const auto [error, count] = co_await http::async_read_some(socket_, codec_->received, parser, kAwait);
-    if (!error || error == http::error::need_buffer) continue;
-    const bool closed = error == http::error::partial_message || error == http::error::end_of_stream ||
-                        error.category() != http::make_error_code(http::error::bad_chunk).category();
-    co_return tl::unexpected(closed ? deadline.failure() : ReadFailure::kMalformed);
+  auto& [received, head_bytes, body] = *codec_;
+  std::size_t filled = 0;
+  while (!body.done() && filled < block.size()) {
+    if (received.size() == 0) {
+      const Deadline deadline(*this, seconds_per_read);
+      const auto [error, count] = co_await socket_.async_read_some(received.prepare(kReadBytes), kAwait);
+      if (error) co_return tl::unexpected(deadline.failure());
+      received.commit(count);
+    }
+    const auto step = body.decode(text_of(received), block.subspan(filled));
+    if (!step) co_return tl::unexpected(ReadFailure::kMalformed);
+    received.consume(step->taken);
+    filled += step->given;
   }
-  co_return std::string_view(block.data(), block.size() - body.size);
+  co_return std::string_view(block.data(), filled);
 }
 
 asio::awaitable<bool> Connection::write(std::string_view bytes, double seconds_per_write) {
@@ -179,6 +180,7 @@ void Connection::cancel() {
 
 std::string response_head(int status, const std::vector<HeaderField>& fields) {
   http::response<http::empty_body> response(static_cast<http::status>(status), 11);
+  response.set(http::field::date, http_date(std::time(nullptr)));
   for (const auto& field : fields) response.insert(field.name, field.value);
   std::ostringstream text;
   text << response.base();

@@ -21,7 +21,7 @@ using Socket = boost::asio::generic::stream_protocol::socket;
 enum class ReadFailure { kClosed, kTimeout, kMalformed };
 
 /// The bytes of one connection, each wait with its deadline: heads as they came, bodies without their
-/// framing (by Beast), and what is written. Used from the I/O thread.
+/// framing, and what is written. Used from the I/O thread.
 class Connection {
  public:
   explicit Connection(Socket socket);
@@ -33,8 +33,8 @@ class Connection {
   /// The bytes of a head as `head_end` cuts them; they stay until `begin_body`.
   boost::asio::awaitable<tl::expected<std::string_view, ReadFailure>> read_head(double seconds);
 
-  /// Hands the head to Beast, ready for its body; false if Beast does not like it.
-  bool begin_body();
+  /// Goes on from the head to its body; false if Beast reads the head in another way than `head` does.
+  bool begin_body(const Head& head);
 
   /// The next bytes of the body in `block`: as many as it holds, fewer at the end, then none.
   boost::asio::awaitable<tl::expected<std::string_view, ReadFailure>> read_body(std::span<char> block,

@@ -76,7 +76,7 @@ Session::Awaitable<void> Session::serve(Exchange& exchange) {
     co_return;
   }
   auto head = check_head(*bytes);
-  if (head && !connection_.begin_body())
+  if (head && !connection_.begin_body(*head))
     head = tl::unexpected(Problem{"bad-header", "The request head does not follow RFC 9112."});
   if (!head) {
     co_await send(exchange, tl::unexpected(head.error()));

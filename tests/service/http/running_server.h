@@ -58,7 +58,7 @@ class ServerTest : public testing::Test {
     return id;
   }
 
-  ScratchDirectory directory_;
+  ScratchFolder directory_;
   FakeEngine engine_;
   Metrics metrics_;
   JobServiceSettings jobs_settings_{
