@@ -1,10 +1,11 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <functional>
-#include <limits>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "algorithms/volume/volume.h"
@@ -64,6 +65,15 @@ inline std::function<double(const Vector3&)> nested_spheres(const Grid& grid,
   return [centre = centre_of(grid), profile = std::move(profile)](const Vector3& position) {
     return profile(distance(position, centre));
   };
+}
+
+/// An octant of nested spheres: `profile(r)` about the outer corner of voxel (0,0,0). The mirrored border of
+/// a flow makes up the other seven.
+inline std::function<double(const Vector3&)> octant_of_spheres(const Grid& grid,
+                                                               std::function<double(double)> profile) {
+  const Vector3& h = grid.spacing_mm;
+  return [corner = Vector3{-h[0] / 2, -h[1] / 2, -h[2] / 2}, profile = std::move(profile)](
+             const Vector3& position) { return profile(distance(position, corner)); };
 }
 
 /// f(r) = height (1 - tanh((r - radius) / width)) / 2: a ball with a soft edge.

@@ -23,9 +23,9 @@ double sum_of(const std::vector<float>& values) {
 /// A Gaussian of variance s^2 becomes one of variance s^2 + 2 t, lower by (s^2 / (s^2 + 2 t))^(3/2).
 double largest_error_of_gaussian(const Vector3& spacing) {
   constexpr double kVariance = 9, kTime = 4;
-  const Grid grid = grid_over(spacing, 40);
+  const Grid grid = grid_over(spacing, 20);
   const auto gaussian = [&](double variance) {
-    return nested_spheres(grid, [variance](double r) {
+    return octant_of_spheres(grid, [variance](double r) {
       return std::pow(kVariance / variance, 1.5) * std::exp(-r * r / (2 * variance));
     });
   };

@@ -48,22 +48,14 @@ struct Phantom {
 
 class NestedSpheres : public testing::TestWithParam<Phantom> {};
 
-/// `profile(r)` about the outer corner of voxel (0,0,0): the mirrored border makes up the other octants.
-std::function<double(const Vector3&)> octant(const Grid& grid, std::function<double(double)> profile) {
-  const Vector3& h = grid.spacing_mm;
-  return [corner = Vector3{-h[0] / 2, -h[1] / 2, -h[2] / 2}, profile](const Vector3& position) {
-    return profile(distance(position, corner));
-  };
-}
-
 /// f(r) becomes f(sqrt(r^2 + 4 t)): the spheres of the whole foliation shrink by their own curvature. 96 mm,
 /// an octant of it.
 TEST_P(NestedSpheres, ComeBackOnTheExactFoliation) {
   const auto& [spacing, t, tolerance] = GetParam();
   const Grid grid = grid_over(spacing, 48);
   const auto f = soft_step(28, 4, 1000);
-  const auto out = smoothed(grid, sampled(grid, octant(grid, f)), t);
-  const auto exact = octant(grid, [&](double r) { return f(std::sqrt(r * r + 4 * t)); });
+  const auto out = smoothed(grid, sampled(grid, octant_of_spheres(grid, f)), t);
+  const auto exact = octant_of_spheres(grid, [&](double r) { return f(std::sqrt(r * r + 4 * t)); });
   const auto everywhere = [](const Vector3&) { return true; };
   EXPECT_LT(error_of(grid, out, exact, everywhere).largest, tolerance * 1000);
 }
@@ -79,10 +71,10 @@ double error_with_spacing(const Vector3& spacing, const Smooth& smooth_values) {
   constexpr double kTime = 0.04;
   const Grid grid = grid_over(spacing, 1);
   const auto f = soft_step(0.6, 0.25);
-  auto values = sampled<Scalar>(grid, octant(grid, f));
+  auto values = sampled<Scalar>(grid, octant_of_spheres(grid, f));
   smooth_values(values, grid, kTime);
-  const auto exact = octant(grid, [&](double r) { return f(std::sqrt(r * r + 4 * kTime)); });
-  const auto radius = octant(grid, [](double r) { return r; });
+  const auto exact = octant_of_spheres(grid, [&](double r) { return f(std::sqrt(r * r + 4 * kTime)); });
+  const auto radius = octant_of_spheres(grid, [](double r) { return r; });
   return error_of(grid, values, exact, [&](const Vector3& position) { return radius(position) < 0.85; }).rms;
 }
 
