@@ -4,6 +4,7 @@
 #include <functional>
 #include <optional>
 #include <span>
+#include <string_view>
 
 #include "algorithms/formats/gzip_reader.h"
 #include "algorithms/formats/input_file.h"

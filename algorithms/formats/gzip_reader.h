@@ -8,7 +8,7 @@
 #include <span>
 
 #include "algorithms/formats/input_file.h"
-#include "algorithms/formats/nifti.h"
+#include "algorithms/formats/read_limits.h"
 #include "algorithms/formats/refusal.h"
 
 namespace volsmooth {

@@ -5,12 +5,11 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <memory>
 #include <stdexcept>
 #include <vector>
 
-#include "algorithms/formats/output_file.h"
+#include "algorithms/formats/buffered_file.h"
 #include "algorithms/volume/parallel.h"
 
 namespace volsmooth {
@@ -54,17 +53,12 @@ struct Block {
   BlockDeflater deflater;
 };
 
-std::array<std::byte, 4> little_endian(std::uint32_t value) {
-  static_assert(std::endian::native == std::endian::little);
-  return std::bit_cast<std::array<std::byte, 4>>(value);
-}
-
 }  // namespace
 
 void write_gzip(const std::filesystem::path& path, std::int64_t size, std::int64_t block_bytes,
                 const std::function<void(std::int64_t, std::span<std::byte>)>& make, const Progress& report) {
-  OutputFile file(path);
-  file.write(std::as_bytes(std::span(kHeader)));
+  BufferedFile file(path);
+  file.value(kHeader);
   std::uint32_t crc = 0;
   std::array<Block, kBlocksAtOnce> blocks;
   const std::int64_t batch_bytes = block_bytes * static_cast<std::int64_t>(kBlocksAtOnce);
@@ -80,13 +74,13 @@ void write_gzip(const std::filesystem::path& path, std::int64_t size, std::int64
     for (const Block& block : std::span(blocks).first(filled)) {
       crc = crc32_gzip_refl(crc, reinterpret_cast<const unsigned char*>(block.plain.data()),
                             block.plain.size());
-      file.write(block.deflated);
+      file.bytes(block.deflated.data(), block.deflated.size());
     }
     report(static_cast<double>(end) / static_cast<double>(size));
   }
-  file.write(std::as_bytes(std::span(kEmptyLastBlock)));
-  file.write(little_endian(crc));
-  file.write(little_endian(static_cast<std::uint32_t>(size)));  // RFC 1952: modulo 2^32
+  file.value(kEmptyLastBlock);
+  file.value(crc);
+  file.value(static_cast<std::uint32_t>(size));  // RFC 1952: modulo 2^32
   file.close();
 }
 

@@ -8,19 +8,12 @@
 #include <tl/expected.hpp>
 #include <vector>
 
+#include "algorithms/formats/read_limits.h"
 #include "algorithms/formats/refusal.h"
 #include "algorithms/progress.h"
 #include "algorithms/volume/volume.h"
 
 namespace volsmooth {
-
-/// Limits that hold for every input, checked before anything is allocated.
-struct ReadLimits {
-  std::int64_t max_voxels = std::int64_t{1} << 31;
-  double max_inflate_ratio = 400;                              ///< inflated to compressed bytes ...
-  std::int64_t free_inflated_bytes = std::int64_t{256} << 20;  ///< ... once this much has come out
-  std::int64_t max_gzip_members = 100'000;
-};
 
 struct ReadOptions {
   std::optional<std::int64_t> volume_index = {};  ///< which volume of a 4-D file, from 0

@@ -6,7 +6,7 @@
 namespace volsmooth {
 
 /// Where the voxels may begin: after the header and its four extension flag bytes.
-inline std::int64_t least_data_offset(int version) {
+constexpr std::int64_t least_data_offset(int version) {
   return version == 1 ? 352 : 544;
 }
 

@@ -2,10 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <fstream>
 
 #include "algorithms/formats/nifti.h"
 #include "tests/support/nifti_maker.h"
+#include "tests/support/peak_memory.h"
 #include "tests/support/temporary_file.h"
 
 namespace volsmooth {
@@ -251,26 +251,11 @@ std::string name_of_row(const testing::TestParamInfo<BadFile>& row) {
 
 INSTANTIATE_TEST_SUITE_P(MaliciousInput, RefusedNifti, testing::ValuesIn(nifti_rows()), name_of_row);
 
-/// The largest memory the process has had, in kB.
-long peak_memory_kb() {
-  std::ifstream status("/proc/self/status");
-  for (std::string line; std::getline(status, line);) {
-    if (line.starts_with("VmHWM:")) return std::stol(line.substr(6));
-  }
-  return 0;
-}
-
-/// Makes the peak the present size again.
-void reset_peak_memory() {
-  std::ofstream("/proc/self/clear_refs") << 5;
-}
-
 TEST(RefusedNifti, AllocatesNothingForADeclaredSize) {
   const test::TemporaryFile file(bytes_of(NiftiFile{.size = {1200, 1200, 1200}, .datatype = 16}));
-  reset_peak_memory();
-  const long before = peak_memory_kb();
+  const test::PeakMemory memory;
   EXPECT_FALSE(read_nifti(file.path(), {}).has_value());
-  EXPECT_LT(peak_memory_kb() - before, 1024);
+  EXPECT_LT(memory.rise(), 1 << 20);
 }
 
 TEST(RefusedNifti, StatesTheNumberOfNonFiniteVoxels) {

@@ -11,6 +11,7 @@
 #include "algorithms/formats/byte_source.h"
 #include "algorithms/volume/parallel.h"
 #include "tests/support/nifti_maker.h"
+#include "tests/support/peak_memory.h"
 #include "tests/support/temporary_file.h"
 
 namespace volsmooth {
@@ -334,7 +335,8 @@ TEST(Nifti, OneVolumeOfASeriesIsReadAndWrittenAsAVolume) {  // N14
   for (const std::int64_t index : {0, 1, 2}) {
     const LoadedVolume loaded = read(series, {.volume_index = index});
     const auto first = series.voxels.begin() + 40 * index;
-    const NiftiFile volume{.size = {4, 5, 2}, .descrip = "volsmooth", .voxels = {first, first + 40}};
+    const NiftiFile volume{
+        .size = {4, 5, 2}, .pixdim = series.pixdim, .descrip = "volsmooth", .voxels = {first, first + 40}};
     EXPECT_EQ(written(loaded).bytes, bytes_of(volume));
   }
 }
@@ -443,6 +445,17 @@ TEST(Nifti, InspectingSaysWhatReadingSays) {
       EXPECT_EQ(inspected->map.linear, loaded->description.map.linear);
     }
   }
+}
+
+TEST(Nifti, InspectingHoldsNoVoxelsInMemory) {
+  ByteVector bytes = bytes_of(NiftiFile{.size = {512, 512, 128}, .voxels = {}});
+  bytes.resize(bytes.size() + (64 << 20));
+  const test::TemporaryFile plain(bytes), compressed(test::gzipped(bytes));
+  ByteVector().swap(bytes);
+  const test::PeakMemory memory;
+  EXPECT_TRUE(inspect_nifti(plain.path(), {}).has_value());
+  EXPECT_TRUE(inspect_nifti(compressed.path(), {}).has_value());
+  EXPECT_LT(memory.rise(), 8 << 20);
 }
 
 NiftiFile large_file() {
