@@ -11,7 +11,7 @@
 namespace volsmooth {
 
 /// The steps of the flows written as the formulas read, for any scalar type: what the fast ones are held to,
-/// and what convergence is measured with in double. Six to fifty times slower than the fast ones.
+/// and what convergence is measured with in double.
 
 /// Read access to a volume that goes on beyond its border as its mirror image.
 template <class Scalar>
