@@ -2,15 +2,16 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <cstring>
 #include <fstream>
 #include <iterator>
-#include <map>
-#include <numeric>
+#include <set>
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -38,50 +39,53 @@ inline TriangleSoup soup_of(const Mesh& mesh) {
 }
 
 inline MergedMesh merge_by_position(const TriangleSoup& soup) {
-  MergedMesh merged;
-  for (const auto& triangle : soup.triangles)
-    merged.positions.insert(merged.positions.end(), triangle.begin(), triangle.end());
-  std::ranges::sort(merged.positions);
-  merged.positions.erase(std::ranges::unique(merged.positions).begin(), merged.positions.end());
-  const auto number = [&](const Float3& position) {
-    return static_cast<std::uint32_t>(std::ranges::lower_bound(merged.positions, position) -
-                                      merged.positions.begin());
+  const auto hash = [](const Float3& position) {
+    std::uint64_t mixed = 0;
+    for (float x : position) mixed = (mixed ^ std::bit_cast<std::uint32_t>(x + 0.0F)) * 0x9E3779B97F4A7C15u;
+    return static_cast<std::size_t>(mixed ^ mixed >> 32);
   };
-  for (const auto& [a, b, c] : soup.triangles) merged.triangles.push_back({number(a), number(b), number(c)});
+  std::unordered_map<Float3, std::uint32_t, decltype(hash)> numbers(soup.triangles.size(), hash);
+  MergedMesh merged;
+  for (const auto& corners : soup.triangles) {
+    Triangle triangle;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto next = static_cast<std::uint32_t>(merged.positions.size());
+      const auto [known, is_new] = numbers.emplace(corners[k], next);
+      if (is_new) merged.positions.push_back(corners[k]);
+      triangle[k] = known->second;
+    }
+    merged.triangles.push_back(triangle);
+  }
   return merged;
 }
 
 /// The first reason why a mesh is no closed oriented 2-manifold; empty when it is one. Independent of the
 /// code under test: from triangles alone.
 inline std::string manifold_fault(const MergedMesh& mesh) {
-  using Edge = std::pair<std::uint32_t, std::uint32_t>;
-  std::vector<Edge> sides;
+  // Round every vertex the far sides of its triangles, each from a corner to a corner, must make one ring.
+  using Side = std::pair<std::uint32_t, std::uint32_t>;
+  std::vector<std::vector<Side>> far_sides(mesh.positions.size());
   for (const Triangle& t : mesh.triangles) {
     for (std::size_t k = 0; k < 3; ++k) {
       if (t[k] == t[(k + 1) % 3]) return "a triangle has two corners at one position";
-      sides.emplace_back(t[k], t[(k + 1) % 3]);
+      far_sides[t[k]].emplace_back(t[(k + 1) % 3], t[(k + 2) % 3]);
     }
   }
-  std::ranges::sort(sides);
-  if (std::ranges::adjacent_find(sides) != sides.end())
-    return "two triangles use an edge in the same direction";
-  for (const auto& [from, to] : sides) {
-    if (!std::ranges::binary_search(sides, Edge{to, from})) return "an edge has one triangle only";
-  }
-  // Round every vertex the triangles must make one ring: follow the far sides from corner to corner.
-  std::vector<std::vector<Edge>> far_sides(mesh.positions.size());
-  for (const Triangle& t : mesh.triangles) {
-    for (std::size_t k = 0; k < 3; ++k) far_sides[t[k]].emplace_back(t[(k + 1) % 3], t[(k + 2) % 3]);
-  }
-  for (const auto& ring : far_sides) {
-    if (ring.empty()) return "a vertex has no triangle";
-    std::uint32_t at = ring.front().first;
+  for (const auto& sides : far_sides) {
+    if (sides.empty()) return "a vertex has no triangle";
+    std::set<std::uint32_t> starts, ends;
+    for (const auto& [start, end] : sides) {
+      if (!starts.insert(start).second || !ends.insert(end).second)
+        return "an edge has two triangles on one side";
+    }
+    if (starts != ends) return "an edge has a triangle on one side only";
     std::size_t steps = 0;
+    std::uint32_t at = sides.front().first;
     do {
-      at = std::ranges::find(ring, at, &Edge::first)->second;
+      at = std::ranges::find(sides, at, &Side::first)->second;
       ++steps;
-    } while (at != ring.front().first);
-    if (steps != ring.size()) return "the triangles round a vertex make more than one ring";
+    } while (at != sides.front().first);
+    if (steps != sides.size()) return "the triangles round a vertex make more than one ring";
   }
   return {};
 }

@@ -57,7 +57,7 @@ TEST(IsosurfaceManifold, AllVolumesOfThreeByTwoByTwoVoxels) {
 
 /// Noise of integers has its isovalue at a third of all voxels exactly.
 TEST(IsosurfaceManifold, NoiseOfManySizes) {
-  constexpr unsigned kVolumes = 3000;
+  constexpr unsigned kVolumes = 2000;
   for (unsigned seed = 0; seed < kVolumes; ++seed) {
     std::mt19937 random(seed);
     const auto up_to = [&random](unsigned n) { return static_cast<std::int64_t>(random() % (n + 1)); };
