@@ -1,11 +1,12 @@
 // The composition root: the only file that knows everyone.
 
 #include <signal.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <cstdio>
 #include <filesystem>
 #include <iostream>
+#include <optional>
 #include <stdexcept>
 
 #include "service/http/log.h"
@@ -16,6 +17,8 @@
 
 namespace volsmooth {
 namespace {
+
+constexpr int kUsageError = 2;
 
 struct Options {
   ServerSettings server;
@@ -86,6 +89,11 @@ class EphemeralFolder {
   std::filesystem::path path_;
 };
 
+/// 80 % of the machine's.
+std::int64_t most_of_the_memory() {
+  return std::int64_t{::sysconf(_SC_PHYS_PAGES)} * ::sysconf(_SC_PAGE_SIZE) / 10 * 8;
+}
+
 sigset_t end_signals() {
   sigset_t set;
   sigemptyset(&set);
@@ -120,8 +128,14 @@ int run(int argc, char** argv) {
   Options options;
   CLI::App app("Smooths medical volumes; an HTTP service. GET /openapi.json describes it.", "volsmoothd");
   declare(app, options);
-  CLI11_PARSE(app, argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : kUsageError;
+  }
   options.server.max_upload_bytes = options.jobs.max_upload_bytes;
+  // Said once, for the single job as for all that run together.
+  if (options.jobs.memory_limit_bytes == 0) options.jobs.memory_limit_bytes = most_of_the_memory();
 
   // Before any thread is there: all inherit the mask, and only sigwait takes them.
   const sigset_t signals = end_signals();

@@ -56,7 +56,7 @@ Session::Awaitable<bool> Session::serve_one() {
   exchange.record.id = ++context_.last_request;
   const auto start = std::chrono::steady_clock::now();
   co_await serve(exchange);
-  if (exchange.request.file) co_await context_.quick.run([&] { return exchange.request.file.reset(), true; });
+  if (exchange.request.file) co_await context_.quick.run([&] { exchange.request.file.reset(); });
 
   auto& record = exchange.record;
   record.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

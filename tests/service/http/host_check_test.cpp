@@ -10,6 +10,11 @@ struct Case {
   std::string slug;  ///< empty: accepted
 };
 
+std::ostream& operator<<(std::ostream& out, const Case& one) {
+  for (const auto& host : one.hosts) out << host << ' ';
+  return out << one.slug;
+}
+
 class HostCheck : public testing::TestWithParam<Case> {};
 
 TEST_P(HostCheck, GivesItsAnswer) {
