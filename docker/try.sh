@@ -137,7 +137,7 @@ port=$("${engine[@]}" port "$container" 8742/tcp | sed -n '1s/.*://p')
 
 label=$("${engine[@]}" image inspect --format '{{index .Config.Labels "org.opencontainers.image.version"}}' "$image")
 [[ $(client --version) == *" $label" ]] ||
-  die "docker/Dockerfile labels the image $label, but it holds $(client --version): set its VERSION"
+  die "docker/Dockerfile labels the image $label, but it holds $(client --version): set its label"
 
 say "smoothing $head_file"
 client smooth ch2.nii.gz -o out --method compare --feature-radius 2mm --isovalue 40,90 --mesh stl,glb ||
