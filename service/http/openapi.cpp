@@ -94,6 +94,8 @@ json openapi_document(const std::vector<MethodInfo>& methods) {
            {{"title", "volsmooth"},
             {"version", VOLSMOOTH_VERSION},
             {"description", "Smooths medical volumes: all isosurfaces at once, by mean curvature flow."}}},
+          {"servers", {{{"url", "/"}}}},
+          {"security", json::array()},
           {"paths", paths},
           {"components", {{"schemas", document_schemas(methods)}}}};
 }

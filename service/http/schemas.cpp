@@ -91,7 +91,22 @@ const json& fixed_schemas() {
       "properties": {
         "name": {"type": "string"},
         "description": {"type": "string"},
-        "parameters": {"type": "array", "items": {"type": "object", "required": ["name"]}}}},
+        "parameters": {"type": "array", "items": {"$ref": "#/components/schemas/MethodParameter"}},
+        "parts": {"description": "The methods that it runs side by side.", "type": "array", "items": {"type": "string"}}}},
+    "MethodParameter": {
+      "type": "object",
+      "required": ["name", "description", "type", "unit", "default"],
+      "properties": {
+        "name": {"type": "string"},
+        "description": {"type": "string"},
+        "type": {"enum": ["number", "string"]},
+        "unit": {"type": ["string", "null"]},
+        "minimum": {"type": "number"},
+        "maximum": {"type": "number"},
+        "choices": {"type": "array", "items": {"type": "string"}},
+        "default": {"type": ["number", "string", "null"]},
+        "default_text": {"description": "How the default follows from the volume.", "type": "string"},
+        "excludes": {"description": "The parameter that may not be given beside this one.", "type": "string"}}},
     "Format": {
       "type": "object",
       "required": ["name", "media_type", "description"],
