@@ -37,8 +37,10 @@ std::vector<double> vertex_areas(const Mesh& mesh) {
 /// The original surface without caps: nearest points, and the side they are seen from.
 class SignedDistance {
  public:
-  SignedDistance(const Mesh& mesh, std::vector<std::uint32_t> triangles)
-      : mesh_(mesh), at_vertices_(mesh), tree_(mesh, std::move(triangles)) {}
+  SignedDistance(const Mesh& mesh, std::vector<std::uint32_t> triangles, const Progress& report)
+      : mesh_(mesh),
+        at_vertices_(mesh, part_of(report, 0, 0.4)),
+        tree_(mesh, std::move(triangles), part_of(report, 0.4, 1)) {}
 
   /// Positive outside. `guess` is a triangle to start from, and becomes the nearest one.
   double operator()(const Vector3& from, std::uint32_t& guess) const {
@@ -96,10 +98,10 @@ Displacement displacement(const Mesh& moved, const Mesh& original, const Progres
   if (triangles.empty()) return {};
   const std::uint32_t start = triangles.front();
   const std::vector<double> areas = vertex_areas(moved);
-  const SignedDistance distance(original, std::move(triangles));
+  const SignedDistance distance(original, std::move(triangles), part_of(report, 0, 0.15));
 
   // Along the curve the nearest triangle of one vertex is a good guess for the next.
-  const std::vector<std::uint32_t> order = morton_order(moved.positions);
+  const std::vector<std::uint32_t> order = morton_order(moved.positions, part_of(report, 0.15, 0.2));
   std::vector<Part> parts(moved.positions.size() / kPerChunk + 1);
   parallel_for(
       static_cast<std::int64_t>(moved.positions.size()), kPerChunk,
@@ -116,7 +118,7 @@ Displacement displacement(const Mesh& moved, const Mesh& original, const Progres
           part.most = std::max(part.most, moved_by);
         }
       },
-      report);
+      part_of(report, 0.2, 1));
 
   Part all;
   for (const Part& part : parts) {

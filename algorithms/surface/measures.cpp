@@ -129,11 +129,11 @@ SurfaceMeasures measure(const Mesh& mesh, const Progress& report) {
       mesh.triangles.size(), Integrals{},
       [&](std::size_t begin, std::size_t end) { return integrate(mesh, apex, begin, end); },
       part_of(report, 0, 0.2));
-  const TrianglesAtVertices triangles(mesh);
+  const TrianglesAtVertices triangles(mesh, part_of(report, 0.2, 0.4));
   const auto connections = sum_of_chunks(
       mesh.positions.size(), Connections{},
       [&](std::size_t begin, std::size_t end) { return connect(mesh, triangles, begin, end); },
-      part_of(report, 0.2, 0.6));
+      part_of(report, 0.4, 0.6));
 
   measures.triangles = static_cast<std::int64_t>(mesh.triangles.size());
   measures.closed = connections.open_vertices == 0;

@@ -15,12 +15,12 @@ namespace {
 constexpr std::size_t kLeafSize = 4;
 constexpr std::int64_t kPerChunk = 1 << 14;
 
-void sort_by_place(const Mesh& mesh, std::vector<std::uint32_t>& triangles) {
+void sort_by_place(const Mesh& mesh, std::vector<std::uint32_t>& triangles, const Progress& report) {
   std::vector<Float3> corners(triangles.size());
   std::ranges::transform(triangles, corners.begin(),
                          [&mesh](std::uint32_t t) { return mesh.positions[mesh.triangles[t][0]]; });
   const std::vector<std::uint32_t> unsorted = triangles;
-  std::ranges::transform(morton_order(corners), triangles.begin(),
+  std::ranges::transform(morton_order(corners, report), triangles.begin(),
                          [&](std::uint32_t k) { return unsorted[k]; });
 }
 
@@ -60,12 +60,12 @@ double TriangleTree::Box::squared_distance(const Vector3& from) const {
   return sum;
 }
 
-TriangleTree::TriangleTree(const Mesh& mesh, std::vector<std::uint32_t> chosen)
+TriangleTree::TriangleTree(const Mesh& mesh, std::vector<std::uint32_t> chosen, const Progress& report)
     : mesh_(mesh),
       triangles_(std::move(chosen)),
       leaves_(std::bit_ceil((triangles_.size() + kLeafSize - 1) / kLeafSize)),
       boxes_(2 * leaves_) {
-  sort_by_place(mesh_, triangles_);
+  sort_by_place(mesh_, triangles_, report);
   parallel_for(static_cast<std::int64_t>(leaves_), kPerChunk, [&](std::int64_t begin, std::int64_t end) {
     for (auto leaf = static_cast<std::size_t>(begin); leaf < static_cast<std::size_t>(end); ++leaf) {
       boxes_[leaves_ + leaf] = box_of_leaf(leaf);

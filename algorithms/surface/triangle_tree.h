@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "algorithms/progress.h"
 #include "algorithms/surface/mesh.h"
 
 namespace volsmooth {
@@ -25,7 +26,7 @@ NearestPoint nearest_point(const Mesh& mesh, std::uint32_t triangle, const Vecto
 class TriangleTree {
  public:
   /// Of the triangles `chosen` of `mesh`, which must outlive the tree; at least one.
-  TriangleTree(const Mesh& mesh, std::vector<std::uint32_t> chosen);
+  TriangleTree(const Mesh& mesh, std::vector<std::uint32_t> chosen, const Progress& report = no_progress);
 
   /// The nearest point of all triangles. `guess` is any triangle of the tree, the faster the nearer it lies.
   NearestPoint nearest(const Vector3& from, std::uint32_t guess) const;

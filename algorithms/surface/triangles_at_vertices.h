@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "algorithms/progress.h"
 #include "algorithms/surface/mesh.h"
 
 namespace volsmooth {
@@ -11,7 +12,7 @@ namespace volsmooth {
 /// The triangles round every vertex of a mesh, in ascending order.
 class TrianglesAtVertices {
  public:
-  explicit TrianglesAtVertices(const Mesh& mesh);
+  TrianglesAtVertices(const Mesh& mesh, const Progress& report);
 
   std::span<const std::uint32_t> at(std::size_t vertex) const {
     return {triangles_.data() + first_[vertex], triangles_.data() + first_[vertex + 1]};
