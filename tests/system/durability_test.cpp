@@ -112,7 +112,8 @@ std::vector<std::string> first_without_second(const std::multiset<std::string>& 
 void expect_all_done_once(const Daemon& daemon, const Acknowledged& acknowledged) {
   const ServiceClient service(daemon);
   std::multiset<std::string> referenced;
-  for (const json& volume : service.get("/v1/volumes").at("volumes")) referenced.insert(volume.at("sha256"));
+  const json volumes = service.get("/v1/volumes");
+  for (const json& volume : volumes.at("volumes")) referenced.insert(volume.at("sha256"));
   for (const auto& [id, file] : acknowledged.volumes) {
     EXPECT_EQ(expect_status(service.call("GET", "/v1/volumes/" + id + "/content"), 200).body, file);
   }
