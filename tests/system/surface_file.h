@@ -10,10 +10,10 @@
 
 namespace volsmooth::test {
 
-/// A GLB file: its JSON, and each mesh in the units of its positions, merged by position.
+/// A GLB file: its JSON, and the triangles of each mesh in the units of its positions.
 struct GlbContent {
   nlohmann::json document;
-  std::vector<MergedMesh> meshes;
+  std::vector<TriangleSoup> meshes;
 };
 
 inline GlbContent glb_content(const std::string& file) {
@@ -39,7 +39,7 @@ inline GlbContent glb_content(const std::string& file) {
         positions[corner] =
             value_at<Float3>(glb.binary, first_position + sizeof(Float3) * std::size_t{corners[corner]});
     }
-    content.meshes.push_back(merge_by_position(soup));
+    content.meshes.push_back(std::move(soup));
   }
   return content;
 }
