@@ -132,6 +132,10 @@ struct Accuracy {
   double tolerance;  ///< of the intensity range
 };
 
+void PrintTo(const Accuracy& accuracy, std::ostream* out) {
+  *out << accuracy.name;
+}
+
 class ExactFoliation : public PhantomTest, public testing::WithParamInterface<Accuracy> {};
 
 /// Mean curvature flow takes f(r) to f(sqrt(r^2 + 4t)). The thesis scheme is of first order: its error grows
