@@ -37,7 +37,7 @@ build() {
     shift
   done
   (($#)) && shift
-  export CCACHE_NOHASHDIR=1
+  export CCACHE_NOHASHDIR=1 CCACHE_BASEDIR=$PWD  # so that every clone can use what one has compiled
   say "building in $directory (the first time takes minutes)"
   local log
   log=$(cmake -S . -B "$directory" -G Ninja "${options[@]}" 2>&1) ||

@@ -15,6 +15,7 @@ build build -DVOLSMOOTH_TESTS=ON
 say "running the tests"
 ctest --test-dir build --output-on-failure --no-tests=error || die "tests failed; each failure is printed above"
 
-build build-sanitize -DVOLSMOOTH_TESTS=ON -DVOLSMOOTH_SANITIZE=address,undefined -DCMAKE_BUILD_TYPE=RelWithDebInfo -- unit_tests
+build build-sanitize -DVOLSMOOTH_TESTS=ON -DVOLSMOOTH_SANITIZE=address,undefined \
+  -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG=-O1 -- unit_tests
 say "running the unit tests under the sanitizers"
 ctest --test-dir build-sanitize --output-on-failure --no-tests=error -L unit -j "$(nproc)" || die "tests failed under the sanitizers; each failure is printed above"
