@@ -75,13 +75,17 @@ VoxelToWorld sform_map(const NiftiFields& fields) {
 }
 
 /// With the unit quaternion (a, b, c, d), a >= 0:  x = R(a, b, c, d) diag(px, py, qfac pz) index + qoffset,
-/// qfac = pixdim[0] < 0 ? -1 : 1 (nifti1.h, "METHOD 2").
+/// qfac = pixdim[0] < 0 ? -1 : 1 (nifti1.h, "METHOD 2"). As in nifti_quatern_to_mat44, a half turn whose b,
+/// c, d were rounded to float is a half turn: the rounding of 1 - b^2 - c^2 - d^2 would turn it by up to 0.04
+/// degrees.
 VoxelToWorld qform_map(const NiftiFields& fields) {
+  constexpr double kHalfTurn = 1e-7;
   auto [b, c, d] = fields.quatern;
   const double length2 = squared_length(fields.quatern);
-  const double scale = length2 > 1 ? 1 / std::sqrt(length2) : 1;
+  const bool is_half_turn = 1 - length2 < kHalfTurn;
+  const double scale = is_half_turn ? 1 / std::sqrt(length2) : 1;
   b *= scale, c *= scale, d *= scale;
-  const double a = std::sqrt(std::max(0.0, 1 - length2));
+  const double a = is_half_turn ? 0 : std::sqrt(1 - length2);
   VoxelToWorld map;
   map.linear = {{{a * a + b * b - c * c - d * d, 2 * (b * c - a * d), 2 * (b * d + a * c)},
                  {2 * (b * c + a * d), a * a + c * c - b * b - d * d, 2 * (c * d - a * b)},

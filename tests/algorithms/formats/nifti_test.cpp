@@ -239,6 +239,21 @@ const std::vector<Rotation> kRotations{
 INSTANTIATE_TEST_SUITE_P(Nifti, QformRotation, testing::ValuesIn(kRotations),
                          [](const auto& row) { return row.param.name; });
 
+/// A half turn about u is 2 u u^T - 1. These axes round to shorter than 1 in float; entries are products of
+/// two of their components, each off by 2^-25 at most, and of 1 / |u|^2.
+TEST(NiftiGeometry, AnObliqueHalfTurnRoundedToFloatIsAHalfTurn) {
+  for (const auto& axis : {Vector3{1, 1, 1}, Vector3{2, -7, 7}}) {
+    const double length = std::hypot(axis[0], axis[1], axis[2]);
+    const Vector3 u{axis[0] / length, axis[1] / length, axis[2] / length};
+    const VoxelToWorld map = read(NiftiFile{.qform_code = 1, .sform_code = 0, .quatern = u}).description.map;
+    for (std::size_t row = 0; row < 3; ++row) {
+      for (std::size_t column = 0; column < 3; ++column) {
+        EXPECT_NEAR(map.linear[row][column], 2 * u[row] * u[column] - (row == column), 8 * 0x1p-25);
+      }
+    }
+  }
+}
+
 TEST(NiftiGeometry, TheImageIsPlacedAsTheMapSays) {
   const LoadedVolume loaded =
       read(NiftiFile{.pixdim = {1, 3, 2, 4}, .srow = {0, -2, 0, 5, 3, 0, 0, 6, 0, 0, 4, 7}});
