@@ -19,9 +19,9 @@ build build "${tests_off[@]}" -- volsmoothd volsmooth
 
 mkdir -p "$out"
 data=$(mktemp -d)
-build/bin/volsmoothd --listen 127.0.0.1:0 --data "$data" --ephemeral 2>"$out/daemon.log" &
+build/bin/volsmoothd --listen 127.0.0.1:0 --data "$data" --ephemeral --log-level info 2>"$out/daemon.log" &
 daemon=$!
-trap 'rm -f "$packages"; kill "$daemon" 2>/dev/null; wait "$daemon" 2>/dev/null; rm -rf "$data"' EXIT
+trap 'rm -f "$packages"; kill "$daemon" 2>/dev/null || true; wait "$daemon" || true; rm -rf "$data"' EXIT
 for _ in {1..100}; do
   url=$(sed -n 's/.*listening on \(http:[^ "]*\).*/\1/p' "$out/daemon.log" | head -1)
   [[ -n $url ]] && break

@@ -8,7 +8,7 @@ source client/setup.sh
 install_packages docker/build-packages.txt tests/packages.txt
 
 say "checking the formatting"
-mapfile -t sources < <(git ls-files '*.h' '*.cpp')
+mapfile -t sources < <(find algorithms service client tests -name '*.h' -o -name '*.cpp')
 clang-format --dry-run -Werror "${sources[@]}" || die "run: clang-format -i on the files above"
 
 build build -DVOLSMOOTH_TESTS=ON
