@@ -14,7 +14,8 @@ struct StepPlan {
   std::int64_t steps = 0;
 };
 
-/// The fewest equal steps of at most `largest_stable_step_mm2` that reach `flow_time_mm2`.
+/// The fewest equal steps of at most `largest_stable_step_mm2` that reach `flow_time_mm2`; 2^53 of that size,
+/// more than any computer takes, where it would need more.
 StepPlan plan_steps(double flow_time_mm2, double largest_stable_step_mm2);
 
 }  // namespace volsmooth

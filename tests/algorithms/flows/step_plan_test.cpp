@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "algorithms/flows/laplacian.h"
 #include "algorithms/flows/mean_curvature_flow.h"
 
@@ -19,6 +21,19 @@ TEST(StepPlan, ReachesTheFlowTimeInTheFewestEqualSteps) {
     EXPECT_DOUBLE_EQ(plan.step_mm2 * static_cast<double>(steps), flow_time);
     EXPECT_LE(plan.step_mm2, largest);
   }
+}
+
+/// 2^63 and more do not fit the number of steps: a negative one would be a job that does nothing and
+/// succeeds.
+TEST(StepPlan, OfAbsurdStrengthsOrSpacingsNeverEndsRatherThanDoNothing) {
+  const std::int64_t most = std::int64_t{1} << 53;
+  for (const double flow_time : {1e19, 1e300, std::numeric_limits<double>::infinity()}) {
+    const StepPlan plan = plan_steps(flow_time, 0.5);
+    EXPECT_EQ(plan.steps, most) << flow_time;
+    EXPECT_EQ(plan.step_mm2, 0.5) << flow_time;
+  }
+  EXPECT_EQ(plan(MeanCurvatureFlow{1e6}, {1e-9, 1e-9, 1e-9}).steps, most);
+  EXPECT_EQ(plan(Laplacian{1e6}, {1e-9, 1, 1}).steps, most);
 }
 
 /// 1 / ((sum 1/h) sqrt(sum 1/h^2)): 1 / (3 sqrt 3) h^2 = 0.192 h^2 for cubes.
