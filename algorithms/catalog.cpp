@@ -15,14 +15,14 @@ std::vector<ParameterInfo> strength_parameters() {
            .description = "Balls of a smaller radius vanish under mean curvature flow; cylinders of this "
                           "radius shrink to 0.71 of it.",
            .unit = "mm",
-           .minimum = 0.002,
+           .minimum = 1e-6,
            .maximum = 2000,
            .default_text = "twice the geometric mean of the spacing",
            .excludes = "flow_time_mm2"},
           {.name = "flow_time_mm2",
            .description = "Time the flow runs, a quarter of the feature radius squared.",
            .unit = "mm^2",
-           .minimum = 1e-6,
+           .minimum = 2.5e-13,
            .maximum = 1e6,
            .default_text = "a quarter of feature_radius_mm squared",
            .excludes = "feature_radius_mm"}};

@@ -60,6 +60,24 @@ TEST_P(CatalogRow, DefaultsToTwiceTheGeometricMeanSpacing) {
   EXPECT_DOUBLE_EQ(number(method().resolve({}, kGrid), "feature_radius_mm"), 2 * std::cbrt(2.5));
 }
 
+/// From 10 nm, voxels of an electron microscope, to those of a survey of the ground.
+TEST_P(CatalogRow, AcceptsItsOwnDefaultsForVoxelsOfAnySize) {
+  for (const double spacing : {1e-5, 5e-4, 1e-3, 1.0, 500.0}) {
+    const auto defaults = method().resolve({}, Grid{{8, 8, 8}, {spacing, spacing, spacing}});
+    for (const ParameterInfo& parameter : method().info.parameters) {
+      EXPECT_GE(number(defaults, parameter.name), parameter.minimum) << spacing << " " << parameter.name;
+      EXPECT_LE(number(defaults, parameter.name), parameter.maximum) << spacing << " " << parameter.name;
+    }
+  }
+}
+
+TEST_P(CatalogRow, HasLimitsThatExcludeAbsurdStrengths) {  // P1
+  for (const ParameterInfo& parameter : method().info.parameters) {
+    EXPECT_GT(parameter.minimum, 1e-300);
+    EXPECT_LT(parameter.maximum, 1e9);
+  }
+}
+
 TEST_P(CatalogRow, ResolvesWhatItResolvedToTheSame) {
   const auto once = method().resolve({}, kGrid);
   EXPECT_EQ(number(method().resolve(once, kGrid), "flow_time_mm2"), number(once, "flow_time_mm2"));
