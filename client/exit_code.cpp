@@ -27,9 +27,9 @@ struct StatusRow {
 constexpr std::array kStatuses{
     StatusRow{401, 401, ExitCode::kNotAllowed}, StatusRow{403, 403, ExitCode::kNotAllowed},
     StatusRow{404, 404, ExitCode::kNoInput},    StatusRow{410, 410, ExitCode::kNoInput},
-    StatusRow{408, 409, ExitCode::kTryLater},   StatusRow{429, 429, ExitCode::kTryLater},
-    StatusRow{400, 499, ExitCode::kBadData},    StatusRow{503, 503, ExitCode::kTryLater},
-    StatusRow{507, 507, ExitCode::kTryLater},
+    StatusRow{408, 409, ExitCode::kTryLater},   StatusRow{421, 421, ExitCode::kNotAllowed},
+    StatusRow{429, 429, ExitCode::kTryLater},   StatusRow{400, 499, ExitCode::kBadData},
+    StatusRow{503, 503, ExitCode::kTryLater},   StatusRow{507, 507, ExitCode::kTryLater},
 };
 
 }  // namespace

@@ -43,4 +43,13 @@ Expected<void> OutputFolder::check_free(const std::vector<std::string>& names) c
   return {};
 }
 
+Expected<void> OutputFolder::check_none_begins(const std::string& prefix) const {
+  std::error_code unreadable;
+  for (const auto& entry : fs::directory_iterator(path_, unreadable)) {
+    const std::string name = entry.path().filename();
+    if (name.starts_with(prefix)) return check_free({name});
+  }
+  return {};
+}
+
 }  // namespace volsmooth

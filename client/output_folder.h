@@ -20,6 +20,7 @@ class OutputFolder {
 
   /// kCannotWrite when one of the names is taken.
   Expected<void> check_free(const std::vector<std::string>& names) const;
+  Expected<void> check_none_begins(const std::string& prefix) const;
 
  private:
   explicit OutputFolder(std::filesystem::path path) : path_(std::move(path)) {}

@@ -27,7 +27,7 @@ class CancelOnExit {
   std::string id_;
 };
 
-/// Everything but the isovalues that the server chooses is checked before anything is computed.
+/// All names are checked before anything is computed; where the server chooses the isovalue, any isovalue's.
 Expected<void> check_names(const Options& options, const OutputFolder& folder, const Json& method) {
   NamePlan plan{.parts = method.value("parts", std::vector<std::string>{}),
                 .mesh_formats = options.order.mesh_formats,
@@ -37,7 +37,12 @@ Expected<void> check_names(const Options& options, const OutputFolder& folder, c
   if (plan.parts.empty()) plan.parts = {options.order.method};
   std::vector<std::string> names;
   for (const auto& input : options.inputs) {
-    for (const std::string& name : predicted_names(plan)) names.push_back(file_name(stem_of(input), name));
+    const std::string stem = stem_of(input);
+    for (const std::string& name : predicted_names(plan)) names.push_back(file_name(stem, name));
+    if (!plan.isovalues.automatic) continue;
+    for (const std::string& part : plan.parts) {
+      if (auto free = folder.check_none_begins(file_name(stem, part + "_iso")); !free) return free;
+    }
   }
   return folder.check_free(names);
 }
@@ -57,8 +62,12 @@ Expected<void> smooth_one(const Options& options, const Session& session, const 
                           const std::filesystem::path& input) {
   const auto volume = upload_volume(session, input, options.query);
   if (!volume) return tl::unexpected(volume.error());
-  auto job = run_job(options, session, volume->at("id").get<std::string>(), input.filename().string());
-  if (!job) return tl::unexpected(job.error());
+  const auto volume_id = volume->at("id").get<std::string>();
+  auto job = run_job(options, session, volume_id, input.filename().string());
+  if (!job) {
+    static_cast<void>(session.api.delete_volume(volume_id));  // a job that goes on all the same keeps it
+    return tl::unexpected(job.error());
+  }
   if (const auto outcome = outcome_of(*job); !outcome) return outcome;
 
   const Fetching fetching{folder, stem_of(input), options.order.isovalues.values, options.force};
@@ -69,7 +78,7 @@ Expected<void> smooth_one(const Options& options, const Session& session, const 
   session.console.document(*job);
   if (!session.server_is_private) return {};
   const auto deleted = session.api.delete_job(job->at("id").get<std::string>());
-  return deleted ? session.api.delete_volume(volume->at("id").get<std::string>()) : deleted;
+  return deleted ? session.api.delete_volume(volume_id) : deleted;
 }
 
 }  // namespace

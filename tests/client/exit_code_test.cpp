@@ -23,10 +23,11 @@ INSTANTIATE_TEST_SUITE_P(
                     AnswerCase{403, "insufficient-scope", 77}, AnswerCase{404, "not-found", 66},
                     AnswerCase{408, "request-timeout", 75}, AnswerCase{409, "volume-in-use", 75},
                     AnswerCase{410, "gone", 66}, AnswerCase{413, "content-too-large", 65},
-                    AnswerCase{415, "unsupported-format", 65}, AnswerCase{422, "nifti-bad-header", 65},
-                    AnswerCase{429, "queue-full", 75}, AnswerCase{500, "internal", 70},
-                    AnswerCase{501, "", 70}, AnswerCase{502, "", 70}, AnswerCase{503, "not-ready", 75},
-                    AnswerCase{507, "insufficient-storage", 75}, AnswerCase{302, "", 70}));
+                    AnswerCase{415, "unsupported-format", 65}, AnswerCase{421, "misdirected", 77},
+                    AnswerCase{422, "nifti-bad-header", 65}, AnswerCase{429, "queue-full", 75},
+                    AnswerCase{500, "internal", 70}, AnswerCase{501, "", 70}, AnswerCase{502, "", 70},
+                    AnswerCase{503, "not-ready", 75}, AnswerCase{507, "insufficient-storage", 75},
+                    AnswerCase{302, "", 70}));
 
 struct FailedJobCase {
   const char* problem;

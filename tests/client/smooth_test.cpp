@@ -131,10 +131,11 @@ TEST_F(Smooth, RefusesTakenNamesBeforeAnythingIsSent) {
   EXPECT_EQ(folder_.content("out/head_report.json"), "mine");
 }
 
-TEST_F(Smooth, RefusesTakenNamesThatOnlyTheServerKnew) {
+TEST_F(Smooth, RefusesTakenNamesOfAnyIsovalueThatTheServerMayChoose) {
   std::filesystem::create_directory(folder_ / "out");
   folder_.put("out/head_laplacian_iso40.stl", "mine");
   EXPECT_EQ(run().error().code, ExitCode::kCannotWrite);
+  EXPECT_FALSE(server_.saw("POST /v1/volumes"));
   EXPECT_THAT(made(), ElementsAre("head_laplacian_iso40.stl"));
   EXPECT_EQ(folder_.content("out/head_laplacian_iso40.stl"), "mine");
 }
