@@ -170,8 +170,12 @@ tl::expected<Job, Problem> JobService::cancel(std::string_view id) {
           {found->id, found->attempt, JobState::kQueued, JobState::kCancelled, found->progress});
     } else if (found->state == JobState::kRunning) {
       stepped = state_->jobs.request_cancel(id);
-      if (const auto running = state_->running.find(id))
+      if (const auto running = state_->running.find(id)) {
         running->interrupt(RunningJob::Interruption::kCancel);
+      } else {
+        const std::lock_guard lock(state_->claiming);
+        state_->recover();
+      }
     }
     if (stepped) return job(id);
   }

@@ -63,7 +63,7 @@ class JobStore {
     int deaths;
     bool cancel_requested;
   };
-  std::vector<Interrupted> running();  ///< at the start: those that the last daemon died under
+  std::vector<Interrupted> running();  ///< as the rows have it
 
   std::set<std::string, std::less<>> results_directories();  ///< those that a succeeded job points to
 

@@ -47,9 +47,11 @@ JobService::State::State(JobServiceSettings given, Engine computing)
   sweep();
 }
 
-/// What the last daemon was running when it ended without stopping.
+/// Jobs that are marked as running though nobody runs them: what the last daemon died under, and what ended
+/// here while its end could not be stored.
 void JobService::State::recover() {
   for (const auto& [job, deaths, cancel_requested] : jobs.running()) {
+    if (running.find(job.id)) continue;
     JobChange change{job.id, job.attempt, JobState::kRunning, JobState::kQueued, {"queued", 0, {}}};
     change.deaths = 1;
     if (cancel_requested) {
@@ -59,12 +61,14 @@ void JobService::State::recover() {
       change.to = JobState::kFailed;
       change.progress = job.progress;
       change.error = Problem{"attempts-exhausted",
-                             "The daemon ended " + std::to_string(deaths + 1) +
-                                 " times while it ran this job; it is not tried again.",
+                             "The job was lost " + std::to_string(deaths + 1) +
+                                 " times, because the daemon ended while it ran or could not store its end; "
+                                 "it is not tried again.",
                              {{"attempts", job.attempt}}};
     }
-    jobs.change(change);
-    spdlog::warn("job {} was running when the daemon ended: now {}", job.id, name_of(change.to));
+    // False: it ended between the two looks.
+    if (settle(change))
+      spdlog::warn("job {} was marked as running, but was not: now {}", job.id, name_of(change.to));
   }
 }
 
@@ -80,6 +84,7 @@ void JobService::State::sweep() {
 WorkerPool::Work JobService::State::claim() {
   const std::lock_guard lock(claiming);
   if (stopping) return {};
+  recover();
   // Strictly the oldest first: when it does not fit beside the running ones, the others wait with it for
   // these to end, so nothing starves. Alone, a job always fits.
   const std::int64_t free = running.empty() ? std::numeric_limits<std::int64_t>::max()

@@ -25,11 +25,10 @@ tl::unexpected<Problem> refuse(std::string slug, std::string detail,
 struct JobService::State {
   State(JobServiceSettings given, Engine computing);
 
-  // The start.
-  void recover();
-  void sweep();
+  void sweep();  ///< at the start
 
   // Running jobs.
+  void recover();  ///< holding `claiming`, or before the start
   WorkerPool::Work claim();
   bool settle(const JobChange& change);
   void tell_final(const Job& job) const;

@@ -8,6 +8,7 @@
 #include <sstream>
 #include <thread>
 
+#include "service/storage/database.h"
 #include "service/storage/digest.h"
 #include "tests/service/jobs/service_fixture.h"
 
@@ -147,6 +148,66 @@ TEST_F(RecoveryTest, ARequestedCancelSurvivesTheDeath) {
   daemon.kill();
   open();
   EXPECT_EQ(service_->job(id)->state, JobState::kCancelled);
+}
+
+/// As long as it lives, no job can leave `running`: every such step fails in the database.
+class NoJobEnds {
+ public:
+  explicit NoJobEnds(const fs::path& data) : database_(data / "volsmooth.db", Database::Access::kWriter) {
+    database_.execute(
+        "CREATE TRIGGER no_job_ends BEFORE UPDATE OF state ON jobs WHEN OLD.state = 'running' "
+        "BEGIN SELECT RAISE(ABORT, 'not now'); END");
+  }
+  NoJobEnds(const NoJobEnds&) = delete;
+  NoJobEnds& operator=(const NoJobEnds&) = delete;
+  ~NoJobEnds() { database_.execute("DROP TRIGGER no_job_ends"); }
+
+ private:
+  Database database_;
+};
+
+class LostEndTest : public JobServiceTest {
+ protected:
+  /// Runs a job whose end cannot be stored. Gives its id when nobody runs it any more.
+  std::string lose_a_job() {
+    service_->start();
+    const auto volume = upload(*service_, "x").value();
+    const std::string id = service_->submit(order_for(volume.id)).value().id;
+    while (fake_.computed == 0) std::this_thread::yield();
+    // The events of an attempt are in memory while somebody runs it.
+    while (events_of(id) > kEventsBeforeTheFirstReport) std::this_thread::yield();
+    EXPECT_EQ(service_->job(id)->state, JobState::kRunning);
+    return id;
+  }
+
+  std::size_t events_of(const std::string& id) { return service_->events_after(id, "")->size(); }
+
+  static constexpr std::size_t kEventsBeforeTheFirstReport = 2;  // queued, running
+};
+
+TEST_F(LostEndTest, IsRunAgainOnceTheStoreWorks) {
+  open();
+  std::string id;
+  {
+    const NoJobEnds broken(settings().data_dir);
+    id = lose_a_job();
+  }
+  const Job job = wait_for(*service_, id);
+  EXPECT_EQ(job.state, JobState::kSucceeded);
+  EXPECT_EQ(job.attempt, 2);
+  EXPECT_TRUE(service_->result(id, "out.nii.gz"));
+}
+
+TEST_F(LostEndTest, CanBeCancelled) {
+  open();
+  std::string id;
+  {
+    const NoJobEnds broken(settings().data_dir);
+    id = lose_a_job();
+    EXPECT_THROW(service_->cancel(id), DatabaseError);
+    service_->stop();
+  }
+  EXPECT_EQ(service_->cancel(id)->state, JobState::kCancelled);
 }
 
 TEST_F(RecoveryTest, SweepsWhatNoRowPointsTo) {
