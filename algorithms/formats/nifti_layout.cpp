@@ -46,6 +46,12 @@ Refused check_size(const NiftiFields& fields, const ReadOptions& options) {
   constexpr std::int64_t kMostBytes = std::int64_t{1} << 62, kWidestVoxel = 8;
   const auto sizes = sizes_of(fields);
   const auto spatial = sizes.first(std::min<std::size_t>(3, sizes.size()));
+  const std::int64_t longest_allowed = options.limits.max_axis_voxels;
+  if (std::ranges::max(spatial) > longest_allowed) {
+    return Refusal{"volume-too-large",
+                   "The header declares an axis of more than " + std::to_string(longest_allowed) + " voxels.",
+                   {{"max_axis_voxels", static_cast<double>(longest_allowed)}}};
+  }
   if (product(spatial, options.limits.max_voxels) && product(sizes, kMostBytes / kWidestVoxel)) {
     return std::nullopt;
   }

@@ -143,7 +143,23 @@ std::vector<BadFile> nifti_rows() {
                  [](F& f) { f.version = 2, f.size.assign(7, std::numeric_limits<std::int64_t>::max()); }),
       bad_fields("N13_product_wraps_32_bits", "volume-too-large",
                  [](F& f) {
+                   f.version = 2, f.size = {65536, 32769, 2};
+                 }),
+      bad_fields("N13_product_and_axis", "volume-too-large",
+                 [](F& f) {
                    f.version = 2, f.size = {65536, 65537, 1};
+                 }),
+      bad_fields("long_x", "volume-too-large",
+                 [](F& f) {
+                   f.version = 2, f.size = {65537, 1, 1};
+                 }),
+      bad_fields("long_y", "volume-too-large",
+                 [](F& f) {
+                   f.version = 2, f.size = {1, 65537, 1};
+                 }),
+      bad_fields("long_z", "volume-too-large",
+                 [](F& f) {
+                   f.version = 2, f.size = {1, 1, 65537};
                  }),
       bad_fields("N14_series", "unsupported-dimensionality",
                  [](F& f) {
@@ -256,6 +272,17 @@ TEST(RefusedNifti, AllocatesNothingForADeclaredSize) {
   const test::PeakMemory memory;
   EXPECT_FALSE(read_nifti(file.path(), {}).has_value());
   EXPECT_LT(memory.rise(), 1 << 20);
+}
+
+TEST(RefusedNifti, StatesTheLimitThatASizeExceeds) {
+  const auto refusal_of = [](const std::vector<std::int64_t>& size) {
+    const test::TemporaryFile file(bytes_of(NiftiFile{.version = 2, .size = size}));
+    return inspect_nifti(file.path(), {}).error();
+  };
+  const Refusal long_axis = refusal_of({65'537, 1, 1}), many_voxels = refusal_of({65'536, 65'536, 1});
+  EXPECT_EQ(long_axis.numbers.at("max_axis_voxels"), 65'536);
+  EXPECT_THAT(long_axis.detail, testing::HasSubstr("65536"));
+  EXPECT_EQ(many_voxels.numbers.at("max_voxels"), 0x1p31);
 }
 
 TEST(RefusedNifti, StatesTheNumberOfNonFiniteVoxels) {
