@@ -10,10 +10,11 @@
 namespace volsmooth {
 
 /// The three slices through the middle voxel of a volume, one across each voxel axis: all that a picture
-/// needs, so that the volume before smoothing need not be kept for it.
+/// needs, so that the volume before smoothing need not be kept for it. Of an axis of more than 2048 voxels
+/// that many are sampled, evenly.
 struct MiddleSlices {
-  Size3 size{};  ///< of the volume
-  VoxelToWorld map;
+  Size3 size{};      ///< samples along each axis: the volume's size, or 2048
+  VoxelToWorld map;  ///< axes and spacings of the samples, so that extents in mm are the volume's
   std::array<std::vector<float>, 3>
       slices;  ///< [axis]: the plane across `axis`, the lower remaining axis fastest
 };

@@ -30,10 +30,12 @@ std::array<std::size_t, 3> nearest_voxel_axes(const VoxelToWorld& map) {
 
 }  // namespace
 
-double SliceView::Direction::index_at(double mm) const {
+SliceView::Between SliceView::Direction::between(double mm) const {
   const auto last = static_cast<double>(count - 1);
-  const double index = std::clamp(mm / spacing_mm - 0.5, 0.0, last);
-  return reversed ? last - index : index;
+  const double shown = std::clamp(mm / spacing_mm - 0.5, 0.0, last);
+  const double index = reversed ? last - shown : shown;
+  const auto low = std::min(static_cast<std::int64_t>(index), std::max<std::int64_t>(count - 2, 0));
+  return {low, std::min(low + 1, count - 1), static_cast<float>(index - static_cast<double>(low))};
 }
 
 std::array<SliceView, 3> radiological_views(const Size3& size, const VoxelToWorld& map) {
@@ -52,39 +54,37 @@ std::array<SliceView, 3> radiological_views(const Size3& size, const VoxelToWorl
 }
 
 MiddleSlices middle_slices(const Volume& volume, const VoxelToWorld& map) {
-  MiddleSlices middle{grid_of(volume).size, map, {}};
-  const Size3 stride{1, middle.size[0], middle.size[0] * middle.size[1]};
+  constexpr std::int64_t kMostSamples = 2048;  // along an axis: more than a picture has pixels
+  const Size3 size = grid_of(volume).size;
+  const Size3 stride{1, size[0], size[0] * size[1]};
+  MiddleSlices middle{size, map, {}};
+  std::array<std::vector<std::int64_t>, 3> offsets;  // [axis]: of the samples, in voxels
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::int64_t samples = middle.size[axis] = std::min(size[axis], kMostSamples);
+    for (std::int64_t i = 0; i < samples; ++i) {
+      offsets[axis].push_back((2 * i + 1) * size[axis] / (2 * samples) * stride[axis]);
+    }
+    for (Vector3& row : middle.map.linear) {
+      row[axis] *= static_cast<double>(size[axis]) / static_cast<double>(samples);
+    }
+  }
   for (std::size_t normal = 0; normal < 3; ++normal) {
     const std::size_t fast = normal == 0 ? 1 : 0, slow = normal == 2 ? 1 : 2;
-    const float* first = voxels_of(volume).data() + middle.size[normal] / 2 * stride[normal];
+    const float* first = voxels_of(volume).data() + size[normal] / 2 * stride[normal];
     std::vector<float>& slice = middle.slices[normal];
-    slice.reserve(static_cast<std::size_t>(middle.size[fast] * middle.size[slow]));
-    for (std::int64_t j = 0; j < middle.size[slow]; ++j) {
-      for (std::int64_t i = 0; i < middle.size[fast]; ++i) {
-        slice.push_back(first[i * stride[fast] + j * stride[slow]]);
-      }
+    slice.reserve(offsets[fast].size() * offsets[slow].size());
+    for (const std::int64_t j : offsets[slow]) {
+      for (const std::int64_t i : offsets[fast]) slice.push_back(first[i + j]);
     }
   }
   return middle;
 }
 
-double intensity_at(const MiddleSlices& volume, const SliceView& view, double along_right,
-                    double along_down) {
+SliceVoxels::SliceVoxels(const MiddleSlices& volume, const SliceView& view)
+    : first_(volume.slices[view.normal_axis].data()) {
   const bool right_is_fast = view.right.axis < view.down.axis;
-  const std::int64_t to_right = right_is_fast ? 1 : view.down.count;
-  const std::int64_t to_down = right_is_fast ? view.right.count : 1;
-  const auto low = [](double index, std::int64_t count) {
-    return std::clamp<std::int64_t>(static_cast<std::int64_t>(index), 0,
-                                    std::max<std::int64_t>(count - 2, 0));
-  };
-  const std::int64_t i = low(along_right, view.right.count), j = low(along_down, view.down.count);
-  const double u = along_right - static_cast<double>(i), v = along_down - static_cast<double>(j);
-
-  const float* corner = volume.slices[view.normal_axis].data() + i * to_right + j * to_down;
-  const std::int64_t next_i = view.right.count > 1 ? to_right : 0, next_j = view.down.count > 1 ? to_down : 0;
-  const double upper = (1 - u) * double{corner[0]} + u * double{corner[next_i]};
-  const double lower = (1 - u) * double{corner[next_j]} + u * double{corner[next_j + next_i]};
-  return (1 - v) * upper + v * lower;
+  to_right_ = right_is_fast ? 1 : view.down.count;
+  to_down_ = right_is_fast ? view.right.count : 1;
 }
 
 }  // namespace volsmooth

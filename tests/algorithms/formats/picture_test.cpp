@@ -4,6 +4,7 @@
 #include <png.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <system_error>
 
 #include "algorithms/formats/slice_views.h"
@@ -76,9 +77,14 @@ TEST_P(Orientation, IsRadiological) {
   // left, sagittal ones to the back; axial ones run backwards, the others down.
   const std::array<std::array<double, 2>, 3> expected{{{1, -2}, {1, -4}, {-2, -4}}};
   for (std::size_t v = 0; v < 3; ++v) {
+    const SliceVoxels voxels(slices, views[v]);
     const auto at = [&](double right_mm, double down_mm) {
-      return intensity_at(slices, views[v], views[v].right.index_at(right_mm),
-                          views[v].down.index_at(down_mm));
+      const auto right = views[v].right.between(right_mm), down = views[v].down.between(down_mm);
+      const auto along = [&](std::int64_t row) {
+        return std::lerp(double{voxels.at(right.low, row)}, double{voxels.at(right.next, row)},
+                         double{right.part});
+      };
+      return std::lerp(along(down.low), along(down.next), double{down.part});
     };
     EXPECT_NEAR((at(30, 20) - at(10, 20)) / 20, expected[v][0], 1e-5) << v;
     EXPECT_NEAR((at(20, 30) - at(20, 10)) / 20, expected[v][1], 1e-5) << v;
@@ -141,6 +147,26 @@ TEST(Picture, OfOneConstantOrThinVolumeIsAPicture) {
         middle_slices(*sampled_in_world(size, map, [](const Vector3&) { return 7; }), map);
     const std::vector<double> isovalues{7, 8};
     EXPECT_GT(picture_of(slices, slices, isovalues).height, 0);
+  }
+}
+
+/// Of an axis longer than that, 2048 voxels are taken; its extent and what lies where stay the same.
+TEST(MiddleSlices, OfAHugeThinVolumeAreSampled) {
+  const Size3 size{5000, 3, 2};
+  const VoxelToWorld map{.linear = scaling(0.5, 2, -3)};
+  const auto volume = sampled_in_world(size, map, [](const Vector3& x) { return x[0]; });
+  const MiddleSlices slices = middle_slices(*volume, map);
+  EXPECT_EQ(slices.size, (Size3{2048, 3, 2}));
+  EXPECT_EQ(slices.slices[2].size(), 2048u * 3);
+  const SliceView axial = radiological_views(slices.size, slices.map)[0];
+  EXPECT_NEAR(axial.right.extent_mm(), 2500, 1e-9);
+  EXPECT_NEAR(axial.down.extent_mm(), 6, 1e-9);
+  const double spacing = 2500.0 / 2048;
+  const SliceVoxels voxels(slices, axial);
+  for (std::int64_t i = 0; i < 2048; ++i) {
+    // The middle of a sample, from the first voxel's centre; what is taken is the voxel it lies in.
+    const double middle = (static_cast<double>(i) + 0.5) * spacing - 0.25;
+    ASSERT_NEAR(double{voxels.at(i, 1)}, middle, 0.25 + 1e-3) << i;
   }
 }
 
