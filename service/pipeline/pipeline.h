@@ -9,7 +9,7 @@ namespace volsmooth {
 /// What one upload or job may take at most.
 struct PipelineLimits {
   std::int64_t max_voxels = std::int64_t{1} << 31;
-  double max_voxel_steps = 5e14;      ///< voxels x steps of one job: job-too-expensive
+  double max_voxel_steps = 2.5e15;    ///< voxels x steps of one job: job-too-expensive
   std::int64_t max_memory_bytes = 0;  ///< of one job: job-too-large; 0: no limit
 };
 

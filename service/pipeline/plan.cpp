@@ -8,10 +8,14 @@
 namespace volsmooth {
 namespace {
 
-/// Volumes held at the peak: the input and the one that flows. Surfaces grow with the area, not the volume: 4
-/// bytes a voxel cover a surface through every tenth voxel.
-constexpr double kVolumeBytesPerVoxel = 2 * sizeof(float);
-constexpr double kSurfaceBytesPerVoxel = 4;
+/// A method works in place on the input; of several, all but the last work on a copy.
+constexpr double kBytesPerVoxelOfVolume = sizeof(float);
+
+/// A surface grows with its area, not the volume: 54 bytes a vertex, before and after, are this much for a
+/// vertex in every tenth voxel. What really comes out is held to the job's limit when it is counted
+/// (run_job.cpp).
+constexpr double kBytesPerVoxelOfSurface = 11;
+
 constexpr std::int64_t kFixedBytes = std::int64_t{64} << 20;
 
 const Method& method_called(const std::string& name) {
@@ -76,8 +80,9 @@ tl::expected<JobPlan, Problem> plan_job(const JobOrder& order, const VolumeFacts
   }
 
   const double volumes_held = method.info.parts.size() > 1 ? 2 : 1;
-  const double bytes_per_voxel = kVolumeBytesPerVoxel * volumes_held + extra_bytes_per_voxel(method) +
-                                 (order.isovalues && order.isovalues->empty() ? 0 : kSurfaceBytesPerVoxel);
+  const double surfaces = order.isovalues ? static_cast<double>(order.isovalues->size()) : 1;
+  const double bytes_per_voxel = kBytesPerVoxelOfVolume * volumes_held + extra_bytes_per_voxel(method) +
+                                 kBytesPerVoxelOfSurface * surfaces;
   plan.memory_bytes = kFixedBytes + static_cast<std::int64_t>(std::ceil(voxels * bytes_per_voxel));
   if (limits.max_memory_bytes > 0 && plan.memory_bytes > limits.max_memory_bytes) {
     return tl::unexpected(

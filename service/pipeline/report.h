@@ -15,6 +15,7 @@ namespace volsmooth {
 /// What one method did to the foliation.
 struct FoliationRow {
   std::string method;
+  ParameterValues parameters;  ///< resolved for this method
   FoliationMeasures before, after;
   WriteOutcome written;
 };
@@ -30,6 +31,10 @@ struct SurfaceRow {
 struct ReportTiming {
   double read_seconds = 0, flow_seconds = 0, surface_seconds = 0, write_seconds = 0;
 };
+
+/// Lets `peak_memory_bytes` of the next report count from now on. The peak is the process's: jobs that run at
+/// the same time share it.
+void restart_peak_memory();
 
 /// `report.json` of the contract.
 nlohmann::ordered_json report_document(const ComputeTask& task, const std::vector<std::string>& warnings,

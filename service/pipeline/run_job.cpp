@@ -19,7 +19,7 @@ namespace {
 
 /// Rough seconds per voxel on two cores, good enough to weigh the stages against each other in the progress.
 constexpr double kReadCost = 12e-9, kStepCost = 1.2e-9, kMeasureCost = 1e-9, kSurfaceCost = 20e-9,
-                 kWriteCost = 15e-9;
+                 kWriteCost = 15e-9, kMeshWriteCost = 5e-9;
 
 const char* const kOriginal = "original";
 
@@ -49,9 +49,10 @@ double steps_of(const Part& part) {
 }
 
 double total_cost(const std::vector<Part>& parts, double isovalues, double voxels) {
-  double cost = kReadCost + kMeasureCost + isovalues * kSurfaceCost / 2;
+  double cost = kReadCost + 2 * kMeasureCost + isovalues * kSurfaceCost / 2;
   for (const Part& part : parts) {
-    cost += kStepCost * steps_of(part) + kMeasureCost + kWriteCost + isovalues * kSurfaceCost;
+    cost +=
+        kStepCost * steps_of(part) + kMeasureCost + kWriteCost + isovalues * (kSurfaceCost + kMeshWriteCost);
   }
   return cost * voxels;
 }
@@ -93,10 +94,15 @@ class JobRun {
   void measure_original() {
     clock_.run("flow", kMeasureCost * voxels_,
                [&](const Progress& progress) { original_foliation_ = measure(*original_, progress); });
-    isovalues_ = task_.order.isovalues ? *task_.order.isovalues : std::vector{otsu_threshold(*original_)};
-    original_slices_ = middle_slices(*original_, description_.map);
+    clock_.run("surfaces", kMeasureCost * voxels_, [&](const Progress& progress) {
+      original_slices_ = middle_slices(*original_, description_.map);
+      isovalues_ =
+          task_.order.isovalues ? *task_.order.isovalues : std::vector{otsu_threshold(*original_, progress)};
+    });
     original_surfaces_ = surfaces_of(*original_);
-    for (const Mesh& surface : original_surfaces_) original_measures_.push_back(measure(surface));
+    clock_.run("surfaces", 0, [&](const Progress& progress) {
+      for (const Mesh& surface : original_surfaces_) original_measures_.push_back(measure(surface, progress));
+    });
   }
 
   std::vector<Mesh> surfaces_of(const Volume& volume) {
@@ -116,7 +122,7 @@ class JobRun {
   void run_part(const Part& part) {
     const std::string& name = part.method->info.name;
     const Volume::Pointer volume = volume_for(part);
-    FoliationRow foliation{name, original_foliation_, {}, {}};
+    FoliationRow foliation{name, part.parameters, original_foliation_, {}, {}};
     clock_.run("flow", kStepCost * steps_of(part) * voxels_,
                [&](const Progress& progress) { part.method->run(*volume, part.parameters, progress); });
     clock_.run("flow", kMeasureCost * voxels_,
@@ -160,7 +166,7 @@ class JobRun {
   void measure_surface(const std::string& method, const Mesh& surface, std::size_t which) {
     SurfaceRow row{method, isovalues_[which], original_measures_[which], {}, {}};
     clock_.run("surfaces", kSurfaceCost / 2 * voxels_, [&](const Progress& progress) {
-      row.after = measure(surface);
+      row.after = measure(surface, progress);
       if (original_surfaces_[which].triangles.empty()) return;
       if (surface.triangles.empty()) {
         warnings_.push_back("no-surface: " + method + " leaves nothing at isovalue " +
@@ -176,7 +182,8 @@ class JobRun {
     for (const std::string& name : task_.order.mesh_formats) {
       const MeshFormat* format = find_mesh_format(name);
       if (format == nullptr) throw std::logic_error("order for a mesh format that is not in the table");
-      clock_.run("write", 0,
+      const double share = method == kOriginal ? 0 : 1 / static_cast<double>(task_.order.mesh_formats.size());
+      clock_.run("write", share * kMeshWriteCost * static_cast<double>(surfaces.size()) * voxels_,
                  [&](const Progress& progress) { write_meshes_as(*format, method, surfaces, progress); });
     }
   }
@@ -247,6 +254,7 @@ class JobRun {
 tl::expected<std::vector<Result>, Problem> run_job(const ComputeTask& task, const StageProgress& report,
                                                    const PipelineLimits& limits) {
   lower_thread_priority();
+  restart_peak_memory();
   tl::expected<std::vector<Result>, Problem> outcome;
   with_threads(task.threads, [&] { outcome = JobRun(task, report).run(limits); });
   return outcome;

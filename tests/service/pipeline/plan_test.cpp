@@ -58,8 +58,22 @@ TEST(Plan, AnIsovalueOutsideTheVolumeIsRefusedWithTheRange) {
 }
 
 TEST(Plan, WhatTheContractPromisesIsWithinTheLimits) {
-  EXPECT_TRUE(plan_job(order("mean-curvature-flow", 10'000), head(1024), {}));
-  EXPECT_TRUE(plan_job(order("compare", 10'000), head(1024), {}));
+  // 1024^3 voxels as fine as CT has them, for the longest flow time promised.
+  for (const double spacing : {0.3, 0.5, 1.0}) {
+    VolumeFacts facts = head(1024);
+    facts.spacing_mm = {spacing, spacing, spacing};
+    for (const char* method : {"mean-curvature-flow", "laplacian", "compare"}) {
+      EXPECT_TRUE(plan_job(order(method, 10'000), facts, {})) << method << " at " << spacing;
+    }
+  }
+}
+
+TEST(Plan, EverySurfaceCountsInTheMemory) {
+  const auto one = plan_job(order("mean-curvature-flow", 1, {300}), head(), {});
+  const auto three = plan_job(order("mean-curvature-flow", 1, {100, 200, 300}), head(), {});
+  const auto none = plan_job(order("mean-curvature-flow", 1, {}), head(), {});
+  EXPECT_EQ(three->memory_bytes - none->memory_bytes, 3 * (one->memory_bytes - none->memory_bytes));
+  EXPECT_GE(none->memory_bytes, 2 * 4 * 256 * 256 * 256);  // the volume, and the one it flows into
 }
 
 TEST(Plan, AJobThatCostsTooMuchIsRefusedWithBothNumbers) {

@@ -6,7 +6,10 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <optional>
 
+#include "algorithms/formats/nifti.h"
+#include "algorithms/surface/otsu.h"
 #include "service/pipeline/pipeline.h"
 #include "tests/support/mesh_checks.h"
 #include "tests/support/nifti_maker.h"
@@ -155,13 +158,12 @@ TEST_F(RunJob, NoIsovaluesMeanNoSurfaces) {
   EXPECT_THAT(report()["surfaces"], IsEmpty());
 }
 
-TEST_F(RunJob, AnAutomaticIsovalueLiesInside) {
+TEST_F(RunJob, TheAutomaticIsovalueIsOtsusThreshold) {
   ComputeTask task = task_for(ball());
   task.order.isovalues.reset();
   run(task);
-  const double isovalue = report()["surfaces"][0]["isovalue"];
-  EXPECT_GT(isovalue, 0);
-  EXPECT_LT(isovalue, 200);
+  const auto input = read_nifti(task.volume_file, {});
+  EXPECT_EQ(report()["surfaces"][0]["isovalue"], otsu_threshold(*input->volume));
 }
 
 TEST_F(RunJob, TheMeshIsInTheFrameAskedFor) {
@@ -183,15 +185,32 @@ TEST_F(RunJob, TheMeshIsInTheFrameAskedFor) {
   }
 }
 
-TEST_F(RunJob, CanBeCancelledInEveryStage) {
+TEST_F(RunJob, CanBeCancelledWithinEveryStage) {
   for (const char* stage : {"read", "flow", "surfaces", "write"}) {
     ComputeTask task = task_for(ball());
     task.parameters = engine_.plan(task.order, task.volume.facts)->parameters;
-    const StageProgress cancel = [&](std::string_view at, double) {
-      if (at == stage) throw Cancelled();
+    // A stage reports its beginning by itself; what moves on from there is the work's own report.
+    std::optional<double> beginning;
+    const StageProgress cancel = [&](std::string_view at, double fraction) {
+      if (at != stage) return;
+      if (beginning && fraction > *beginning) throw Cancelled();
+      beginning = fraction;
     };
+    task.threads = 1;
     EXPECT_THROW(static_cast<void>(engine_.compute(task, cancel)), Cancelled) << stage;
   }
+}
+
+TEST_F(RunJob, AVolumeThatIsAllInsideIsItsBox) {
+  test::NiftiFile full = ball();
+  for (double& voxel : full.voxels) voxel = 50 + voxel / 100;
+  ComputeTask task = task_for(full);
+  task.order.isovalues = std::vector{task.volume.facts.intensity_min};
+  run(task);
+  const auto surface = report()["surfaces"][0];
+  EXPECT_EQ(surface["euler_characteristic"]["after"], 2);
+  EXPECT_NEAR(surface["volume_mm3"]["after"], 32 * 32 * 32, 1e-6 * 32 * 32 * 32);
+  EXPECT_EQ(surface["cap_area_mm2"], surface["area_mm2"]["after"]);
 }
 
 TEST_F(RunJob, ProgressStaysWithinTheWholeAndReachesItsEnd) {

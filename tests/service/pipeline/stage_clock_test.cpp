@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <thread>
+
 namespace volsmooth {
 namespace {
 
@@ -34,10 +36,11 @@ TEST(StageClock, AddsUpTheTimeOfAStage) {
   const StageProgress report = [](std::string_view, double) {};
   StageClock clock(2, report);
   EXPECT_EQ(clock.seconds("flow"), 0);
-  clock.run("flow", 1, [](const Progress&) {});
-  const double once = clock.seconds("flow");
-  clock.run("flow", 1, [](const Progress&) {});
-  EXPECT_GE(clock.seconds("flow"), once);
+  const auto work = [](const Progress&) { std::this_thread::sleep_for(std::chrono::milliseconds(2)); };
+  clock.run("flow", 1, work);
+  EXPECT_GE(clock.seconds("flow"), 0.002);
+  clock.run("flow", 1, work);
+  EXPECT_GE(clock.seconds("flow"), 0.004);
   EXPECT_EQ(clock.seconds("read"), 0);
 }
 
