@@ -1,5 +1,6 @@
 #include "algorithms/formats/voxel_type.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
@@ -11,9 +12,21 @@
 namespace volsmooth {
 namespace {
 
-/// Whether `float` can lack digits that a T has.
+/// Whether rounding to float moved the intensity of a stored value by more than half a stored unit. The unit
+/// of a float is 1, as that of an integer, or what float32 resolves at its value; doubles must be floats as
+/// well.
 template <class T>
-constexpr bool kWiderThanFloat = std::numeric_limits<T>::digits > std::numeric_limits<float>::digits;
+bool lost_digits(T value, float intensity, Scaling scaling) {
+  // long double: its 64 digits hold every integer
+  using Exact = std::conditional_t<std::is_integral_v<T> && sizeof(T) == 8, long double, double>;
+  const auto stored = static_cast<Exact>(value);
+  Exact unit = 1;
+  if constexpr (std::is_floating_point_v<T>) {
+    if (static_cast<T>(static_cast<float>(value)) != value) return std::isfinite(value);
+    unit = std::max(unit, 0x1p-23 * std::abs(stored));
+  }
+  return std::abs(intensity - scaling.inter - stored * scaling.slope) > unit / 2 * std::abs(scaling.slope);
+}
 
 /// The largest double that converts to T without overflow.
 template <class T>
@@ -25,6 +38,8 @@ double highest_of() {
 template <class T, bool kSwapped>
 DecodeCounts decode_in_order(std::span<const std::byte> stored, Scaling scaling,
                              std::span<float> intensities) {
+  const bool keeps_digits = std::numeric_limits<T>::digits <= std::numeric_limits<float>::digits &&
+                            scaling.slope == 1 && scaling.inter == 0;
   DecodeCounts counts;
   for (std::size_t i = 0; i < intensities.size(); ++i) {
     T value;
@@ -35,11 +50,7 @@ DecodeCounts decode_in_order(std::span<const std::byte> stored, Scaling scaling,
       counts.non_finite += !std::isfinite(value);
       counts.overflowing += std::isfinite(value) && !std::isfinite(intensities[i]);
     }
-    // long double: its 64 digits hold every integer
-    if constexpr (kWiderThanFloat<T>) {
-      counts.inexact +=
-          static_cast<long double>(static_cast<float>(value)) != static_cast<long double>(value);
-    }
+    if (!keeps_digits) counts.inexact += lost_digits(value, intensities[i], scaling);
   }
   return counts;
 }

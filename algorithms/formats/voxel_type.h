@@ -17,7 +17,7 @@ struct Scaling {
 struct DecodeCounts {
   std::int64_t non_finite = 0;   ///< NaN or infinite as stored
   std::int64_t overflowing = 0;  ///< finite as stored, too large for float as an intensity
-  std::int64_t inexact = 0;      ///< stored values that float cannot hold
+  std::int64_t inexact = 0;      ///< stored values that their intensity in float does not tell from others
   DecodeCounts& operator+=(const DecodeCounts& other);
 };
 

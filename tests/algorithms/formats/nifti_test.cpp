@@ -410,6 +410,21 @@ TEST(NiftiValues, LargeIntegersWarnOfFloat) {
   }
 }
 
+/// Floats near a million are 1/16 apart: of 64 stored values a thousandth apart, one is told from the others.
+TEST(NiftiValues, ScalingsThatFloatDoesNotResolveWarnOfFloat) {
+  const auto warnings = [](int datatype, double slope, double inter) {
+    return read(NiftiFile{.version = 2, .datatype = datatype, .slope = slope, .inter = inter})
+        .description.warnings;
+  };
+  for (const int datatype : {2, 4, 512, 8, 768, 1024, 1280, 16, 64}) {
+    for (const double slope : {1e-3, -1e-3}) {
+      EXPECT_THAT(warnings(datatype, slope, 1e6), Contains(StartsWith("precision-reduced"))) << datatype;
+      EXPECT_THAT(warnings(datatype, slope, 1), Not(Contains(StartsWith("precision-reduced")))) << datatype;
+    }
+    EXPECT_THAT(warnings(datatype, 0.37, -12.25), Not(Contains(StartsWith("precision-reduced")))) << datatype;
+  }
+}
+
 /// A volume of 32^3 int16 voxels.
 std::vector<std::string> warnings_for(const std::function<double(std::size_t)>& value) {
   NiftiFile file{.size = {32, 32, 32}, .voxels = {}};
