@@ -66,12 +66,24 @@ tcp::acceptor listen_on(asio::io_context& io, const tcp::endpoint& endpoint, boo
   }
 }
 
+/// Whatever else is at `path`, such as somebody's file, stays.
+void remove_socket(const std::filesystem::path& path) {
+  std::error_code ignored;
+  if (std::filesystem::symlink_status(path, ignored).type() == std::filesystem::file_type::socket)
+    std::filesystem::remove(path, ignored);
+}
+
 /// Removes the socket that a daemon left behind when it was killed; a living one keeps its own.
 void remove_stale_socket(asio::io_context& io, const std::filesystem::path& path) {
+  std::error_code ignored;
+  const auto found = std::filesystem::symlink_status(path, ignored);
+  if (std::filesystem::exists(found) && found.type() != std::filesystem::file_type::socket)
+    fail("cannot listen on the Unix socket " + path.string() +
+         ": something that is not a socket is there already. Give another path, or remove it yourself.");
   stream_protocol::socket probe(io);
   error_code answer;
   probe.connect(stream_protocol::endpoint(path.string()), answer);
-  if (answer == asio::error::connection_refused) std::filesystem::remove(path);
+  if (answer == asio::error::connection_refused) remove_socket(path);
 }
 
 stream_protocol::acceptor listen_on(asio::io_context& io, const std::filesystem::path& path) {
@@ -185,7 +197,7 @@ struct Server::State {
     all_ended.get_future().wait_for(kGrace);
     io.stop();
     thread.join();
-    if (!socket_path.empty()) std::filesystem::remove(socket_path);
+    if (!socket_path.empty()) remove_socket(socket_path);
   }
 
   ServerSettings settings;

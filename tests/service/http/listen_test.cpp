@@ -1,0 +1,49 @@
+#include <fstream>
+
+#include "tests/service/http/running_server.h"
+
+namespace volsmooth {
+namespace {
+
+using Listen = ServerTest;
+
+TEST_F(Listen, FileAtThePathOfTheUnixSocketIsLeftAlone) {
+  const auto path = directory_.path() / "results.csv";
+  std::ofstream(path) << "precious";
+  const Api api{jobs_, metrics_};
+  EXPECT_THROW(Server({.listen = "unix:" + path.string()}, api), std::runtime_error);
+  std::string content;
+  std::ifstream(path) >> content;
+  EXPECT_EQ(content, "precious");
+}
+
+TEST_F(Listen, StopLeavesAFileThatTookThePlaceOfTheSocket) {
+  const auto path = directory_.path() / "socket";
+  start({.listen = "unix:" + path.string()});
+  std::filesystem::remove(path);
+  std::ofstream(path) << "precious";
+  server_.reset();
+  EXPECT_TRUE(std::filesystem::exists(path));
+}
+
+TEST_F(Listen, SocketOfAKilledDaemonIsReplaced) {
+  const auto path = directory_.path() / "socket";
+  start({.listen = "unix:" + path.string()});
+  const auto kept = directory_.path() / "kept";
+  std::filesystem::create_hard_link(path, kept);
+  server_.reset();
+  std::filesystem::rename(kept, path);
+  start({.listen = "unix:" + path.string()});
+  EXPECT_EQ(ask("GET /healthz").status, 200);
+}
+
+TEST_F(Listen, LivingDaemonKeepsItsSocket) {
+  const auto path = directory_.path() / "socket";
+  start({.listen = "unix:" + path.string()});
+  const Api api{jobs_, metrics_};
+  EXPECT_THROW(Server({.listen = "unix:" + path.string()}, api), std::runtime_error);
+  EXPECT_EQ(ask("GET /healthz").status, 200);
+}
+
+}  // namespace
+}  // namespace volsmooth
