@@ -48,7 +48,8 @@ std::string_view text_of(const beast::flat_buffer& buffer) {
 
 }  // namespace
 
-/// Cancels what the socket waits for when the time is over, for as long as it lives.
+/// Cancels what the socket waits for when the time is over, for as long as it lives. A read that is complete
+/// by then, but not yet seen, cannot be cancelled: a loop of reads asks `expired` before each of them.
 class Connection::Deadline {
  public:
   Deadline(Connection& connection, double seconds) : connection_(connection) {
@@ -64,7 +65,8 @@ class Connection::Deadline {
   Deadline(const Deadline&) = delete;
   Deadline& operator=(const Deadline&) = delete;
 
-  ReadFailure failure() const { return *expired_ ? ReadFailure::kTimeout : ReadFailure::kClosed; }
+  bool expired() const { return *expired_; }
+  ReadFailure failure() const { return expired() ? ReadFailure::kTimeout : ReadFailure::kClosed; }
 
  private:
   Connection& connection_;
@@ -103,6 +105,7 @@ asio::awaitable<tl::expected<std::string_view, ReadFailure>> Connection::read_he
       codec_->head_bytes = end.value_or(text.size());
       co_return text.substr(0, codec_->head_bytes);
     }
+    if (deadline.expired()) co_return tl::unexpected(ReadFailure::kTimeout);
     const auto wanted = kMaxHeadBytes + 1 - text.size();
     const auto [error, count] = co_await socket_.async_read_some(received.prepare(wanted), kAwait);
     if (error) co_return tl::unexpected(deadline.failure());
@@ -156,7 +159,7 @@ asio::awaitable<void> Connection::close_gently() {
   socket_.shutdown(Socket::shutdown_send, ignored);
   const Deadline deadline(*this, kDiscardSeconds);
   std::vector<char> discarded(kReadBytes);
-  for (error_code error; !error;)
+  for (error_code error; !error && !deadline.expired();)
     std::tie(error, std::ignore) = co_await socket_.async_read_some(asio::buffer(discarded), kAwait);
   socket_.close(ignored);
 }

@@ -124,6 +124,16 @@ TEST_F(Framing, ClientThatStillSendsSeesTheRefusal) {
   EXPECT_TRUE(client.is_closed());
 }
 
+TEST_F(Framing, ClientThatNeverStopsSendingIsCutOff) {
+  auto client = connect();
+  client.send("POST /v1/volumes HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9999999999\r\n\r\n");
+  const std::string flood(1 << 20, 'x');
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);  // a hang, not a measure
+  bool taken = true;
+  while (taken && std::chrono::steady_clock::now() < end) taken = client.send(flood);
+  EXPECT_FALSE(taken);
+}
+
 TEST_F(Framing, ChunkedBodyMayHaveExtensionsAndTrailersThatAreDiscarded) {
   auto client = connect();
   const auto answer =
