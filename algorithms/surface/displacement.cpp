@@ -93,9 +93,9 @@ struct Part {
 
 }  // namespace
 
-Displacement displacement(const Mesh& moved, const Mesh& original, const Progress& report) {
+std::optional<Displacement> displacement(const Mesh& moved, const Mesh& original, const Progress& report) {
   std::vector<std::uint32_t> triangles = free_triangles(original);
-  if (triangles.empty()) return {};
+  if (triangles.empty()) return std::nullopt;
   const std::uint32_t start = triangles.front();
   const std::vector<double> areas = vertex_areas(moved);
   const SignedDistance distance(original, std::move(triangles), part_of(report, 0, 0.15));
@@ -125,8 +125,8 @@ Displacement displacement(const Mesh& moved, const Mesh& original, const Progres
     all = {all.area + part.area, all.moment + part.moment, std::min(all.least, part.least),
            std::max(all.most, part.most)};
   }
-  if (all.area == 0) return {};
-  return {all.moment / all.area, all.least, all.most};
+  if (all.area == 0) return std::nullopt;
+  return Displacement{all.moment / all.area, all.least, all.most};
 }
 
 }  // namespace volsmooth

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include "algorithms/progress.h"
 #include "algorithms/surface/mesh.h"
 
@@ -27,6 +29,8 @@ struct Displacement {
   double max_mm = 0;
 };
 
-Displacement displacement(const Mesh& moved, const Mesh& original, const Progress& report = no_progress);
+/// None when one of the surfaces has nothing but caps: there is no distance then.
+std::optional<Displacement> displacement(const Mesh& moved, const Mesh& original,
+                                         const Progress& report = no_progress);
 
 }  // namespace volsmooth

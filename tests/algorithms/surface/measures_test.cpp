@@ -65,8 +65,16 @@ TEST(Measures, SeeAnEdgeOfFourTriangles) {
 TEST(Measures, OfNothingAreZero) {
   EXPECT_EQ(measure(Mesh{}).triangles, 0);
   EXPECT_FALSE(measure(Mesh{}).closed);
-  EXPECT_EQ(displacement(Mesh{}, tetrahedron()).mean_mm, 0);
-  EXPECT_EQ(displacement(tetrahedron(), Mesh{}).mean_mm, 0);
+}
+
+TEST(Displacement, FromOrToNothingButCapsIsNone) {
+  Mesh caps = tetrahedron();
+  caps.triangle_on_cap.assign(4, 1);
+  for (const Mesh& nothing : {Mesh{}, caps}) {
+    EXPECT_FALSE(displacement(nothing, tetrahedron()).has_value());
+    EXPECT_FALSE(displacement(tetrahedron(), nothing).has_value());
+  }
+  EXPECT_TRUE(displacement(tetrahedron(), tetrahedron()).has_value());
 }
 
 /// The surface of a ball about `centre`, in voxels of 0.5 mm over a cube of 24 mm about the origin.
@@ -84,14 +92,14 @@ constexpr double kFaceted = 0.01;
 
 TEST(Displacement, OfConcentricBallsIsTheDifferenceOfTheirRadii) {
   for (double radius : {6.5, 7.75, 8.0, 8.25, 9.5}) {
-    const Displacement moved = displacement(ball_of(radius), ball_of(8));
+    const Displacement moved = displacement(ball_of(radius), ball_of(8)).value();
     for (double value : {moved.mean_mm, moved.min_mm, moved.max_mm}) EXPECT_NEAR(value, radius - 8, kFaceted);
   }
 }
 
 TEST(Displacement, OfASurfaceFromItselfIsZero) {
   const Mesh mesh = ball_of(8);
-  const Displacement still = displacement(mesh, mesh);
+  const Displacement still = displacement(mesh, mesh).value();
   EXPECT_EQ(still.min_mm, 0);
   EXPECT_EQ(still.max_mm, 0);
 }
@@ -99,14 +107,14 @@ TEST(Displacement, OfASurfaceFromItselfIsZero) {
 TEST(Displacement, OfAFarSurfaceIsItsDistance) {
   Mesh far = ball_of(2);
   for (Float3& position : far.positions) position[0] += 1000;
-  const Displacement moved = displacement(far, ball_of(8));
+  const Displacement moved = displacement(far, ball_of(8)).value();
   EXPECT_NEAR(moved.min_mm, 1000 - 2 - 8, kFaceted);
   EXPECT_NEAR(moved.max_mm, 1000 + 2 - 8, kFaceted);
 }
 
 TEST(Displacement, IsMeasuredToTheSurfaceNotToItsCaps) {
   const Vector3 on_the_border{0, 0, -12};
-  const Displacement moved = displacement(ball_of(7, on_the_border), ball_of(8, on_the_border));
+  const Displacement moved = displacement(ball_of(7, on_the_border), ball_of(8, on_the_border)).value();
   EXPECT_NEAR(moved.min_mm, -1, kFaceted);
   EXPECT_NEAR(moved.max_mm, -1, kFaceted);
 }
@@ -120,7 +128,7 @@ TEST(Displacement, HasItsSignFromEdgesAndCornersToo) {
     all_free.triangle_on_cap.assign(4, 0);
     probe.triangle_on_cap.assign(4, 0);
     probe.positions[0] = place;
-    const Displacement moved = displacement(probe, all_free);
+    const Displacement moved = displacement(probe, all_free).value();
     EXPECT_NEAR(expected > 0 ? moved.max_mm : moved.min_mm, expected, 1e-6);
   }
 }
@@ -128,8 +136,8 @@ TEST(Displacement, HasItsSignFromEdgesAndCornersToo) {
 TEST(Displacement, DoesNotDependOnTheNumberOfThreads) {
   const Mesh moved = ball_of(7.3), original = ball_of(8);
   Displacement one, two;
-  with_threads(1, [&] { one = displacement(moved, original); });
-  with_threads(2, [&] { two = displacement(moved, original); });
+  with_threads(1, [&] { one = displacement(moved, original).value(); });
+  with_threads(2, [&] { two = displacement(moved, original).value(); });
   EXPECT_EQ(one.mean_mm, two.mean_mm);
   EXPECT_EQ(one.min_mm, two.min_mm);
   EXPECT_EQ(one.max_mm, two.max_mm);
