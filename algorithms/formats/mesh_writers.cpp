@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cmath>
 
 #include "algorithms/formats/mesh_files.h"
 
@@ -26,7 +27,11 @@ const MeshFormat* find_mesh_format(std::string_view name) {
 
 std::string isovalue_text(double isovalue) {
   std::array<char, 32> digits;
-  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), isovalue + 0.0).ptr;
+  const double size = std::abs(isovalue);
+  const bool fixed = size == 0 || (size >= 1e-6 && size < 1e15);
+  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), isovalue + 0.0,
+                                 fixed ? std::chars_format::fixed : std::chars_format::scientific)
+                       .ptr;
   return {digits.data(), end};
 }
 

@@ -26,7 +26,8 @@ struct MeshFormat {
 const std::vector<MeshFormat>& mesh_formats();
 const MeshFormat* find_mesh_format(std::string_view name);
 
-/// The shortest text that reads back as `isovalue`, as in file and node names: "300", "-300", "0.5".
+/// The shortest text that reads back as `isovalue`, as in file and node names: "300", "-300", "0.0001".
+/// Without an exponent as long as 1e-6 <= |isovalue| < 1e15.
 std::string isovalue_text(double isovalue);
 
 }  // namespace volsmooth

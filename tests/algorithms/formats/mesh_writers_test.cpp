@@ -175,6 +175,13 @@ TEST(IsovalueText, IsTheShortestThatReadsBack) {
   EXPECT_EQ(isovalue_text(0.5), "0.5");
   EXPECT_EQ(isovalue_text(0.1), "0.1");
   EXPECT_EQ(isovalue_text(-0.0), "0");
+  EXPECT_EQ(isovalue_text(100000), "100000");
+  EXPECT_EQ(isovalue_text(0.0001), "0.0001");
+  EXPECT_EQ(isovalue_text(-1e-6), "-0.000001");
+  EXPECT_EQ(isovalue_text(999999999999999), "999999999999999");
+  EXPECT_EQ(isovalue_text(-1.2345678901234567e-6), "-0.0000012345678901234567");
+  EXPECT_EQ(isovalue_text(1e15), "1e+15");
+  EXPECT_EQ(isovalue_text(-2.5e-7), "-2.5e-07");
 }
 
 }  // namespace
