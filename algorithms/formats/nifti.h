@@ -38,6 +38,9 @@ struct VolumeDescription {
   double intensity_min = 0;
   double intensity_max = 0;
   std::int64_t distinct_values = 0;  ///< counted up to 256; 257 means more
+  /// Intensity of voxels that nothing was measured at: what took the place of non-finite ones, or the minimum
+  /// where padding-values is warned of.
+  std::optional<float> padding_value = {};
   std::vector<std::string> warnings;
   NiftiHeader header;
 };

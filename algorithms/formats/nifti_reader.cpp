@@ -98,6 +98,12 @@ std::optional<Refusal> decode_volume(ByteSource& source, const ParsedHeader& par
   return std::nullopt;
 }
 
+std::optional<float> padding_value(const DecodeCounts& counts, const VoxelStatistics& statistics,
+                                   const ReadOptions& options) {
+  if (counts.non_finite > 0) return options.non_finite;
+  return looks_padded(statistics) ? std::optional(statistics.minimum()) : std::nullopt;
+}
+
 VolumeDescription describe(ParsedHeader parsed, const NiftiLayout& layout, const VoxelStatistics& statistics,
                            std::vector<std::string> warnings) {
   VolumeDescription description;
@@ -141,7 +147,9 @@ tl::expected<VolumeDescription, Refusal> read_through(const std::filesystem::pat
   if (!refusal) refusal = check_values(counts, options);
   if (refusal) return tl::unexpected(*std::move(refusal));
   warn_of_voxels(*layout->type, counts, statistics, warnings);
-  return describe(*std::move(parsed), *layout, statistics, std::move(warnings));
+  auto description = describe(*std::move(parsed), *layout, statistics, std::move(warnings));
+  description.padding_value = padding_value(counts, statistics, options);
+  return description;
 }
 
 }  // namespace

@@ -15,7 +15,8 @@ bool looks_like_labels(const VoxelType& type, const VoxelStatistics& statistics)
                                                     kLabelRuns * static_cast<double>(statistics.non_zero());
 }
 
-/// Scanners fill what they did not see with a negative value far below air, such as -2000 or -3024.
+}  // namespace
+
 bool looks_padded(const VoxelStatistics& statistics) {
   const double gap = static_cast<double>(statistics.second_lowest()) - statistics.minimum();
   const double range = static_cast<double>(statistics.maximum()) - statistics.second_lowest();
@@ -23,8 +24,6 @@ bool looks_padded(const VoxelStatistics& statistics) {
          static_cast<double>(statistics.at_minimum()) >=
              kPaddingShare * static_cast<double>(statistics.count());
 }
-
-}  // namespace
 
 void warn_of_voxels(const VoxelType& type, const DecodeCounts& counts, const VoxelStatistics& statistics,
                     std::vector<std::string>& warnings) {

@@ -451,6 +451,19 @@ TEST(NiftiValues, IsolatedMinimumWarnsOfPadding) {
       << "that is air";
 }
 
+/// Of padding in intensity, of replaced voxels what replaced them.
+TEST(NiftiValues, PaddingIsNamed) {
+  NiftiFile file{.size = {32, 32, 32}, .datatype = 16, .slope = 2, .inter = 24, .voxels = {}};
+  for (std::size_t i = 0; i < 32 * 32 * 32; ++i) {
+    file.voxels.push_back(static_cast<double>(i * 7919 % 3000) - 1000);
+  }
+  EXPECT_EQ(read(file, {.non_finite = -1.0F}).description.padding_value, std::nullopt);
+  for (std::size_t i = 0; i < file.voxels.size(); i += 50) file.voxels[i] = -2000;
+  EXPECT_EQ(read(file).description.padding_value, -3976);
+  file.voxels[7] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(read(file, {.non_finite = -5000.0F}).description.padding_value, -5000);
+}
+
 TEST(NiftiValues, DistinctValuesAreCountedUpTo256) {
   for (const std::size_t distinct : {1, 2, 255, 256, 257, 1000}) {
     NiftiFile file{.size = {2000, 1, 1}, .voxels = {}};
