@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <mutex>
 #include <vector>
 
@@ -11,6 +12,7 @@ namespace volsmooth {
 namespace {
 
 constexpr std::size_t kBins = 4096;
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr std::int64_t kPerChunk = 1 << 18;
 
 using Histogram = std::vector<std::int64_t>;
@@ -28,15 +30,16 @@ void for_each_chunk(const Volume& volume, const Take& take, const Progress& repo
       report);
 }
 
-std::ranges::minmax_result<float> range_of(const Volume& volume, const Progress& report) {
-  std::ranges::minmax_result<float> range{voxels_of(volume).front(), voxels_of(volume).front()};
+/// Infinity to -infinity where no voxel counts. No voxel equals the NaN that stands for "none excluded".
+std::ranges::minmax_result<float> range_of(const Volume& volume, float excluded, const Progress& report) {
+  std::ranges::minmax_result<float> range{kInfinity, -kInfinity};
   for_each_chunk(
       volume,
-      [&range](std::span<const float> voxels, std::mutex& merging) {
-        float low = voxels.front(), high = voxels.front();
+      [&range, excluded](std::span<const float> voxels, std::mutex& merging) {
+        float low = kInfinity, high = -kInfinity;
         for (float voxel : voxels) {
-          low = std::min(low, voxel);
-          high = std::max(high, voxel);
+          low = std::min(low, voxel == excluded ? kInfinity : voxel);
+          high = std::max(high, voxel == excluded ? -kInfinity : voxel);
         }
         const std::lock_guard lock(merging);
         range = {std::min(range.min, low), std::max(range.max, high)};
@@ -45,7 +48,8 @@ std::ranges::minmax_result<float> range_of(const Volume& volume, const Progress&
   return range;
 }
 
-Histogram histogram_of(const Volume& volume, double low, double high, const Progress& report) {
+Histogram histogram_of(const Volume& volume, double low, double high, float excluded,
+                       const Progress& report) {
   Histogram histogram(kBins);
   const double scale = static_cast<double>(kBins) / (high - low);
   for_each_chunk(
@@ -53,6 +57,7 @@ Histogram histogram_of(const Volume& volume, double low, double high, const Prog
       [&](std::span<const float> voxels, std::mutex& merging) {
         Histogram counts(kBins);
         for (float voxel : voxels) {
+          if (voxel == excluded) continue;
           const auto bin = static_cast<std::size_t>((double{voxel} - low) * scale);
           ++counts[std::min(bin, kBins - 1)];
         }
@@ -90,11 +95,13 @@ double best_border(const Histogram& histogram) {
 
 }  // namespace
 
-double otsu_threshold(const Volume& volume, const Progress& report) {
-  const auto range = range_of(volume, part_of(report, 0, 0.4));
+double otsu_threshold(const Volume& volume, const Progress& report, std::optional<float> excluded) {
+  const float left_out = excluded.value_or(std::numeric_limits<float>::quiet_NaN());
+  const auto range = range_of(volume, left_out, part_of(report, 0, 0.4));
   const double low = range.min, high = range.max;
-  if (!(high > low)) return low;
-  const Histogram histogram = histogram_of(volume, low, high, part_of(report, 0.4, 1));
+  if (low > high) return left_out;
+  if (low == high) return low;
+  const Histogram histogram = histogram_of(volume, low, high, left_out, part_of(report, 0.4, 1));
   return low + (high - low) * best_border(histogram) / static_cast<double>(kBins);
 }
 

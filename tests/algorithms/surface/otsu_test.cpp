@@ -44,6 +44,25 @@ TEST(Otsu, OfTwoEqualHumpsLiesHalfway) {
   EXPECT_NEAR(otsu_threshold(*volume), 750 + 500, 10);
 }
 
+/// Padding of -2000 below a scan of air and soft tissue would draw the threshold into the gap between the
+/// two.
+TEST(Otsu, LeavesExcludedVoxelsOut) {
+  const auto scan = [](unsigned part_of_padding) {
+    std::mt19937 random(4);
+    return filled([&] {
+      const auto tissue = random() % 101 + (random() % 2 == 0 ? 0 : 900);
+      return part_of_padding > 0 && random() % part_of_padding == 0 ? -4000.0 : static_cast<double>(tissue);
+    });
+  };
+  EXPECT_LT(otsu_threshold(*scan(4)), 0);
+  EXPECT_NEAR(otsu_threshold(*scan(4), no_progress, -4000.0F), 500, 1);
+  EXPECT_EQ(otsu_threshold(*scan(0), no_progress, -4000.0F), otsu_threshold(*scan(0)));
+}
+
+TEST(Otsu, OfNothingButExcludedVoxelsIsTheirValue) {
+  EXPECT_EQ(otsu_threshold(*filled([] { return -2000; }), no_progress, -2000.0F), -2000);
+}
+
 TEST(Otsu, DoesNotDependOnTheNumberOfThreads) {
   std::mt19937 random(3);
   const auto volume =
