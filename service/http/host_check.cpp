@@ -19,19 +19,37 @@ std::string_view name_of_host(std::string_view host) {
   return good ? host.substr(0, colon) : std::string_view();
 }
 
+bool is_ours(std::string_view host, const HostNames& ours) {
+  return std::ranges::find(ours.names, lowered(name_of_host(host))) != ours.names.end();
+}
+
+/// Whether the field says that a page from elsewhere sends this.
+bool is_foreign(const HeaderField& field, const HostNames& ours) {
+  if (field.name == "sec-fetch-site") return lowered(field.value) == "cross-site";
+  if (field.name != "origin") return false;
+  const auto scheme = field.value.find("://");  // an origin without one is "null": a page that may not say
+  return scheme == std::string::npos || !is_ours(std::string_view(field.value).substr(scheme + 3), ours);
+}
+
 }  // namespace
 
 tl::expected<void, Problem> check_host(const Head& head, const HostNames& ours) {
   const auto is_host = [](const HeaderField& field) { return field.name == "host"; };
-  const std::string name = lowered(name_of_host(head.header("host")));
-  if (std::ranges::count_if(head.fields, is_host) != 1 || name.empty())
+  const auto host = head.header("host");
+  if (std::ranges::count_if(head.fields, is_host) != 1 || name_of_host(host).empty())
     return tl::unexpected(
         Problem{"bad-host", "A request must have one Host field: a name and maybe a port."});
-  if (std::ranges::find(ours.names, name) == ours.names.end())
+  if (!is_ours(host, ours))
     return tl::unexpected(
         Problem{"misdirected-request",
                 "Address the daemon as localhost or 127.0.0.1, or start it with --host-name "
                 "and the name you use."});
+  return {};
+}
+
+tl::expected<void, Problem> check_origin(const Head& head, const HostNames& ours) {
+  if (std::ranges::any_of(head.fields, [&](const HeaderField& field) { return is_foreign(field, ours); }))
+    return tl::unexpected(Problem{"cross-origin", "A page of another site may not use this service."});
   return {};
 }
 

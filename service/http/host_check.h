@@ -18,4 +18,8 @@ struct HostNames {
 /// bad-host for none or two, misdirected-request for one that is not ours.
 tl::expected<void, Problem> check_host(const Head& head, const HostNames& ours);
 
+/// cross-origin for what a browser sends on behalf of a page that is not ours: it asks nobody before a simple
+/// POST (https://fetch.spec.whatwg.org/#http-origin). Clients that are no browsers send neither field.
+tl::expected<void, Problem> check_origin(const Head& head, const HostNames& ours);
+
 }  // namespace volsmooth

@@ -16,6 +16,7 @@ constexpr auto kTypes = std::to_array<ProblemType>({
     {"bad-host", 400, "Missing or malformed Host"},
     {"bad-target", 400, "Malformed request target"},
     {"content-too-large", 413, "The body is too large"},
+    {"cross-origin", 403, "A page of another site sent this"},
     {"expectation-failed", 417, "Unknown expectation"},
     {"header-too-large", 431, "The request head is too large"},
     {"length-required", 411, "A body is needed"},

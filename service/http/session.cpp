@@ -100,6 +100,7 @@ Session::Awaitable<void> Session::serve(Exchange& exchange) {
 tl::expected<void, Problem> Session::admit(Exchange& exchange) const {
   Request& request = exchange.request;
   if (auto known = check_host(request.head, context_.hosts); !known) return known;
+  if (auto own = check_origin(request.head, context_.hosts); !own) return own;
   auto target = parse_target(request.head.target);
   if (!target) return tl::unexpected(target.error());
   auto match = match_route(request.head.method, target->segments);

@@ -75,6 +75,8 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(
         HeadCase{"GET /healthz", "", "bad-host", 400},
         HeadCase{"GET /healthz", "Host: evil.example\r\n", "misdirected-request", 421},
+        HeadCase{"POST /v1/volumes", kHost + "Origin: https://evil.example\r\nContent-Length: 1\r\n",
+                 "cross-origin", 403},
         HeadCase{"GET /v1/../x", kHost, "bad-target", 400}, HeadCase{"GET *", kHost, "bad-target", 400},
         HeadCase{"GET /nothing", kHost, "not-found", 404},
         HeadCase{"TRACE /healthz", kHost, "unknown-method", 501},

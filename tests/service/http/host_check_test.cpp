@@ -40,5 +40,37 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{{"127.0.0.2"}, "misdirected-request"},
                     Case{{"localhost, evil.example"}, "misdirected-request"}));
 
+struct OriginCase {
+  HeaderField field;
+  std::string slug;  ///< empty: accepted
+};
+
+std::ostream& operator<<(std::ostream& out, const OriginCase& one) {
+  return out << one.field.name << ' ' << one.field.value;
+}
+
+class OriginCheck : public testing::TestWithParam<OriginCase> {};
+
+TEST_P(OriginCheck, GivesItsAnswer) {
+  Head head;
+  head.fields = {{"host", "localhost"}, GetParam().field};
+  const auto checked = check_origin(head, {});
+  EXPECT_EQ(checked ? "" : checked.error().slug, GetParam().slug);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Rows, OriginCheck,
+    testing::Values(
+        OriginCase{{"accept", "*/*"}, ""}, OriginCase{{"origin", "http://localhost:8742"}, ""},
+        OriginCase{{"origin", "https://LOCALHOST"}, ""}, OriginCase{{"origin", "http://127.0.0.1:3000"}, ""},
+        OriginCase{{"origin", "http://[::1]:8742"}, ""},
+        OriginCase{{"origin", "https://evil.example"}, "cross-origin"},
+        OriginCase{{"origin", "http://localhost.evil.example:8742"}, "cross-origin"},
+        OriginCase{{"origin", "http://evil.example://localhost"}, "cross-origin"},
+        OriginCase{{"origin", "null"}, "cross-origin"}, OriginCase{{"origin", ""}, "cross-origin"},
+        OriginCase{{"origin", "localhost"}, "cross-origin"},
+        OriginCase{{"sec-fetch-site", "cross-site"}, "cross-origin"},
+        OriginCase{{"sec-fetch-site", "same-origin"}, ""}, OriginCase{{"sec-fetch-site", "none"}, ""}));
+
 }  // namespace
 }  // namespace volsmooth
