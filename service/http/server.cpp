@@ -131,9 +131,10 @@ struct Server::State {
     } else {
       auto acceptor = listen_on(io, endpoint_of(settings.listen), settings.allow_open_network);
       const auto bound = acceptor.local_endpoint();
-      const auto host = bound.address().to_string();
-      address = "http://" + (bound.address().is_v6() ? "[" + host + "]" : host) + ":" +
-                std::to_string(bound.port());
+      const auto ip = bound.address().to_string();
+      const auto host = bound.address().is_v6() ? "[" + ip + "]" : ip;
+      if (!bound.address().is_unspecified()) context.hosts.names.push_back(host);
+      address = "http://" + host + ":" + std::to_string(bound.port());
       serve(std::move(acceptor));
     }
   }

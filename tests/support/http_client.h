@@ -37,7 +37,7 @@ class HttpClient {
     descriptor_ = ::socket(is_unix ? AF_UNIX : AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
     const timeval patience{10, 0};
     ::setsockopt(descriptor_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
-    if (is_unix ? !connect_unix(address.substr(5)) : !connect_tcp(address.substr(address.rfind(':') + 1)))
+    if (is_unix ? !connect_unix(address.substr(5)) : !connect_tcp(address.substr(7)))
       throw std::runtime_error("cannot connect to " + address);
   }
   ~HttpClient() { ::close(descriptor_); }
@@ -87,11 +87,12 @@ class HttpClient {
   bool is_closed() { return received_.empty() && !fill(); }
 
  private:
-  bool connect_tcp(const std::string& port) {
+  bool connect_tcp(const std::string& host_and_port) {
+    const auto colon = host_and_port.rfind(':');
     sockaddr_in address{};
     address.sin_family = AF_INET;
-    address.sin_port = htons(static_cast<std::uint16_t>(std::stoi(port)));
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    address.sin_port = htons(static_cast<std::uint16_t>(std::stoi(host_and_port.substr(colon + 1))));
+    if (::inet_pton(AF_INET, host_and_port.substr(0, colon).c_str(), &address.sin_addr) != 1) return false;
     return ::connect(descriptor_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
   }
 

@@ -45,5 +45,12 @@ TEST_F(Listen, LivingDaemonKeepsItsSocket) {
   EXPECT_EQ(ask("GET /healthz").status, 200);
 }
 
+TEST_F(Listen, OwnAddressIsAnAcceptedHost) {
+  start({.listen = "127.0.0.2:0"});
+  const std::string host = server_->address().substr(std::string("http://").size());
+  EXPECT_EQ(connect().exchange("GET /healthz HTTP/1.1\r\nHost: " + host + "\r\n\r\n").status, 200);
+  EXPECT_EQ(connect().exchange("GET /healthz HTTP/1.1\r\nHost: 127.0.0.3\r\n\r\n").status, 421);
+}
+
 }  // namespace
 }  // namespace volsmooth
