@@ -1,6 +1,7 @@
 #include "service/http/file_reply.h"
 
 #include <algorithm>
+#include <system_error>
 
 #include "service/http/accept.h"
 #include "service/http/ascii.h"
@@ -35,6 +36,15 @@ std::vector<FilePiece> multipart_pieces(const std::vector<ByteRange>& ranges, co
   return pieces;
 }
 
+tl::expected<std::shared_ptr<const OpenFile>, Problem> open_stored(const std::filesystem::path& path) {
+  try {
+    return std::make_shared<const OpenFile>(path);
+  } catch (const std::system_error& error) {
+    if (error.code() != std::errc::no_such_file_or_directory) throw;
+    return tl::unexpected(Problem{"gone", "It was deleted while it was asked for."});
+  }
+}
+
 }  // namespace
 
 Reply reply_with_file(const Request& request, const StoredFile& file) {
@@ -55,7 +65,9 @@ Reply reply_with_file(const Request& request, const StoredFile& file) {
     ranges = std::move(*asked);
   }
 
-  FileBody body{std::make_shared<const OpenFile>(file.path), {{"", 0, file.bytes}}, file.media_type};
+  auto opened = open_stored(file.path);
+  if (!opened) return tl::unexpected(opened.error());
+  FileBody body{std::move(*opened), {{"", 0, file.bytes}}, file.media_type};
   if (!ranges.empty()) response.status = 206;
   if (ranges.size() == 1) {
     response.headers.push_back({"Content-Range", content_range(ranges[0], file.bytes)});
