@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <ranges>
 
 #include "algorithms/formats/nifti_limits.h"
@@ -17,23 +18,39 @@ double squared_length(const std::array<double, 3>& v) {
   return v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
 }
 
-/// pixdim[axis + 1], or 1 for an axis of one voxel whose step the file left open.
-double step_along(const NiftiFields& fields, std::size_t axis) {
-  const double step = fields.pixdim[axis + 1];
-  return fields.dim[axis + 1] == 1 && !is_spacing(step) ? 1 : step;
+bool is_open(const NiftiFields& fields, std::size_t axis) {
+  return fields.dim[axis + 1] == 1 && !is_spacing(fields.pixdim[axis + 1]);
 }
 
+/// pixdim[1..3]; an axis of one voxel whose step the file left open takes the smallest of the others, 1 if
+/// all are open.
 Vector3 steps_of(const NiftiFields& fields) {
-  return {step_along(fields, 0), step_along(fields, 1), step_along(fields, 2)};
+  std::optional<double> smallest;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double step = fields.pixdim[axis + 1];
+    if (!is_open(fields, axis)) smallest = std::min(smallest.value_or(step), step);
+  }
+  Vector3 steps;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    steps[axis] = is_open(fields, axis) ? smallest.value_or(1) : fields.pixdim[axis + 1];
+  }
+  return steps;
 }
 
 bool all_finite(std::ranges::input_range auto&& numbers) {
   return std::ranges::all_of(numbers, [](double number) { return std::isfinite(number); });
 }
 
-bool in_proportion(const Vector3& spacing) {
-  const auto [least, largest] = std::ranges::minmax(spacing);
-  return std::ranges::all_of(spacing, is_spacing) && largest <= kLargestSpacingRatio * least;
+/// Whether all are distances between voxels, and in proportion along axes of more than one.
+bool in_proportion(const Vector3& spacing, const NiftiFields& fields) {
+  if (!std::ranges::all_of(spacing, is_spacing)) return false;
+  double least = std::numeric_limits<double>::infinity(), largest = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (fields.dim[axis + 1] == 1) continue;
+    least = std::min(least, spacing[axis]);
+    largest = std::max(largest, spacing[axis]);
+  }
+  return largest <= kLargestSpacingRatio * least;
 }
 
 /// The largest distance between the places that two maps give a corner of the volume.
@@ -101,7 +118,8 @@ VoxelToWorld qform_map(const NiftiFields& fields) {
 
 VoxelToWorld pixdim_map(const NiftiFields& fields) {
   VoxelToWorld map;
-  for (std::size_t axis = 0; axis < 3; ++axis) map.linear[axis][axis] = step_along(fields, axis);
+  const Vector3 steps = steps_of(fields);
+  for (std::size_t axis = 0; axis < 3; ++axis) map.linear[axis][axis] = steps[axis];
   return map;
 }
 
@@ -129,12 +147,12 @@ bool names_unit_of_length(const NiftiFields& fields) {
 std::optional<Refusal> check_spacing(const NiftiFields& fields) {
   const auto bad = [](const char* detail) { return Refusal{"nifti-bad-spacing", detail}; };
   if (!all_finite(fields.pixdim | std::views::take(4))) return bad("pixdim[0..3] must be finite.");
-  if (!in_proportion(steps_of(fields))) {
+  if (!in_proportion(steps_of(fields), fields)) {
     return bad("pixdim[1..3] must be positive distances between voxels, no more than 1000 to 1 apart.");
   }
   if (fields.sform_code > 0 && all_finite(fields.srow | std::views::join)) {
     const Vector3 spacing = spacing_of(sform_map(fields));
-    if (std::ranges::min(spacing) > 0 && !in_proportion(spacing)) {
+    if (std::ranges::min(spacing) > 0 && !in_proportion(spacing, fields)) {
       return bad("The sform's voxel sizes must be distances no more than 1000 to 1 apart.");
     }
   }

@@ -18,7 +18,7 @@ double mm_per_unit(const NiftiFields& fields);
 bool names_unit_of_length(const NiftiFields& fields);
 
 /// Refuses with nifti-bad-spacing what is no distance between voxels: NaN, infinite, negative, zero or out of
-/// proportion. An axis of one voxel may have any finite step.
+/// proportion. For an axis of one voxel, pixdim may hold any finite number, and the sform any distance.
 std::optional<Refusal> check_spacing(const NiftiFields& fields);
 
 /// Refuses with nifti-bad-orientation: numbers that are not finite, a quaternion longer than 1, a map that

@@ -186,6 +186,10 @@ std::vector<BadFile> nifti_rows() {
       bad_fields("N18_bitpix", "nifti-bad-header", [](F& f) { f.bitpix = 32; }),
       bad_fields("N19_pixdim_nan", "nifti-bad-spacing", [](F& f) { f.pixdim[1] = kNan; }),
       bad_fields("N19_pixdim_infinite", "nifti-bad-spacing", [](F& f) { f.pixdim[3] = kInfinity; }),
+      bad_fields("N19_pixdim_nan_of_one_voxel", "nifti-bad-spacing",
+                 [](F& f) {
+                   f.size = {10, 12, 1}, f.pixdim[3] = kNan;
+                 }),
       bad_fields("N20_pixdim_0", "nifti-bad-spacing", [](F& f) { f.pixdim[2] = 0; }),
       bad_fields("N20_pixdim_negative", "nifti-bad-spacing", [](F& f) { f.pixdim[2] = -1; }),
       bad_fields("N20_pixdim_tiny", "nifti-bad-spacing", [](F& f) { f.pixdim[2] = 1e-30; }),

@@ -283,6 +283,20 @@ TEST(NiftiGeometry, AnAxisOfOneVoxelMayLeaveItsStepOpen) {
   NiftiFile file{.size = {10, 12, 1}, .qform_code = 1, .sform_code = 0};
   file.pixdim[3] = 0;
   EXPECT_THAT(read(file).description.spacing_mm, ElementsAre(1, 1, 1));
+  file.pixdim = {1, 500, 400, 0};  // 1 mm would be out of proportion
+  EXPECT_THAT(read(file).description.spacing_mm, ElementsAre(500, 400, 400));
+  file.pixdim = {1, 2, 3, -5};
+  EXPECT_THAT(read(file).description.spacing_mm, ElementsAre(2, 3, 2));
+  const NiftiFile point{.size = {1, 1, 1}, .pixdim = {1, 0, 0, 0}, .sform_code = 0, .voxels = {7}};
+  EXPECT_THAT(read(point).description.spacing_mm, ElementsAre(1, 1, 1));
+}
+
+TEST(NiftiGeometry, AnAxisOfOneVoxelMayBeOutOfProportion) {
+  NiftiFile file{.size = {10, 12, 1}, .pixdim = {1, 1, 1, 5000}, .sform_code = 0};
+  EXPECT_THAT(read(file).description.spacing_mm, ElementsAre(1, 1, 5000));
+  file.sform_code = 1;
+  file.srow[10] = 5000;
+  EXPECT_THAT(read(file).description.spacing_mm, ElementsAre(1, 1, 5000));
 }
 
 struct Unit {
