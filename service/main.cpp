@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <atomic>
 #include <filesystem>
 #include <iostream>
 #include <optional>
@@ -112,6 +113,11 @@ void serve(const Options& options) {
     metrics.job_done(job);
     log_job(job);
   });
+  std::atomic<bool> store_lost = false;
+  jobs.on_store_lost([&store_lost] {
+    store_lost = true;
+    ::kill(::getpid(), SIGTERM);
+  });
   Server server(options.server, {jobs, metrics});
   jobs.start();
   log_event("ready", "volsmoothd " VOLSMOOTH_VERSION " listening on " + server.address());
@@ -122,6 +128,8 @@ void serve(const Options& options) {
   log_event("stopping", received == SIGTERM ? "SIGTERM" : "SIGINT");
   server.stop();
   jobs.stop();
+  if (store_lost)
+    throw std::runtime_error("nobody knows whether a commit stands; the next start finds out and recovers");
 }
 
 int run(int argc, char** argv) {

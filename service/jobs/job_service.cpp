@@ -226,6 +226,10 @@ void JobService::on_final(std::function<void(const Job&)> observer) {
   state_->observer = std::move(observer);
 }
 
+void JobService::on_store_lost(std::function<void()> observer) {
+  state_->database.on_condemned(std::move(observer));
+}
+
 ServiceStatistics JobService::statistics() {
   ServiceStatistics found = state_->jobs.statistics();
   found.free_disk_bytes = state_->files.free_bytes();

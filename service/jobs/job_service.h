@@ -97,6 +97,10 @@ class JobService {
   /// Called once for every job that becomes final, with its document; for metrics. Set before `start`.
   void on_final(std::function<void(const Job&)> observer);
 
+  /// Called once, from any thread, when a commit failed so that only a restart can tell whether it stands:
+  /// the process is to end, and the next start recovers. Set before `start`.
+  void on_store_lost(std::function<void()> observer);
+
   ServiceStatistics statistics();
   std::optional<std::string> not_ready_because();  ///< none: ready
 

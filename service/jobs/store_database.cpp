@@ -106,6 +106,15 @@ StoreDatabase::StoreDatabase(const std::filesystem::path& file)
       start_number_(prepare(writer_)),
       reader_(file, Database::Access::kReader) {}
 
+void StoreDatabase::commit(Transaction& transaction) {
+  try {
+    transaction.commit();
+  } catch (const DatabaseError&) {
+    if (condemned()) on_condemned_();
+    throw;
+  }
+}
+
 void audit(Database& database, std::string_view subject, std::string_view action) {
   database.run("INSERT INTO audit (at_ms, subject, action) VALUES (?, ?, ?)",
                milliseconds_of(now_in_milliseconds()), subject, action);

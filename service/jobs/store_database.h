@@ -2,8 +2,10 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <mutex>
 #include <string_view>
+#include <utility>
 
 #include "service/jobs/job.h"
 #include "service/storage/database.h"
@@ -34,18 +36,23 @@ class StoreDatabase {
     const std::lock_guard lock(writer_mutex_);
     Transaction transaction(writer_, Transaction::Kind::kWrite);
     auto result = body(writer_);
-    transaction.commit();
+    commit(transaction);
     return result;
   }
 
   /// True once it is open whether a commit will survive a restart; every write throws from then on.
   bool condemned() const { return writer_.condemned(); }
+  /// Called once when that comes about. Set before other threads use the database.
+  void on_condemned(std::function<void()> observer) { on_condemned_ = std::move(observer); }
 
  private:
+  void commit(Transaction& transaction);
+
   std::mutex writer_mutex_, reader_mutex_;
   Database writer_;  // before the reader, which must be closed first
   std::int64_t start_number_;
   Database reader_;
+  std::function<void()> on_condemned_ = [] {};
 };
 
 // The pieces that volumes and jobs share. Those that write belong into the caller's transaction.

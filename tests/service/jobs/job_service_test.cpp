@@ -1,11 +1,15 @@
 #include "service/jobs/job_service.h"
 
+#include <sys/resource.h>
+
+#include <csignal>
 #include <fstream>
 #include <limits>
 #include <map>
 #include <set>
 #include <thread>
 
+#include "service/storage/database.h"
 #include "service/storage/digest.h"
 #include "tests/service/jobs/service_fixture.h"
 
@@ -325,6 +329,47 @@ TEST_F(JobServiceTest, AnUploadLargerThanTheDiskIsRefused) {
   large.max_upload_bytes = std::numeric_limits<std::int64_t>::max();
   JobService service(large, fake_.engine());
   EXPECT_EQ(slug_of(service.begin_upload(std::int64_t{1} << 60)), "insufficient-storage");
+}
+
+/// As long as it lives, no file of this process can grow beyond a page, so writing to the database fails in a
+/// way that SQLite cannot judge.
+class NoFileGrows {
+ public:
+  NoFileGrows() {
+    ::getrlimit(RLIMIT_FSIZE, &before_);
+    rlimit page = before_;
+    page.rlim_cur = 4096;
+    ::setrlimit(RLIMIT_FSIZE, &page);
+  }
+  NoFileGrows(const NoFileGrows&) = delete;
+  NoFileGrows& operator=(const NoFileGrows&) = delete;
+  ~NoFileGrows() {
+    ::setrlimit(RLIMIT_FSIZE, &before_);
+    ::signal(SIGXFSZ, signal_before_);
+  }
+
+ private:
+  rlimit before_{};
+  sighandler_t signal_before_ = ::signal(SIGXFSZ, SIG_IGN);
+};
+
+TEST_F(JobServiceTest, ACommitOfUnknownOutcomeIsToldOnceAndEndsAllWriting) {
+  int times_told = 0;
+  open();
+  service_->on_store_lost([&] { ++times_told; });
+  const auto volume = upload(*service_, "x").value();
+  {
+    const NoFileGrows full;
+    EXPECT_THROW(service_->submit(order_for(volume.id)), DatabaseError);
+  }
+  EXPECT_EQ(times_told, 1);
+  EXPECT_THROW(service_->submit(order_for(volume.id)), DatabaseError);
+  EXPECT_EQ(times_told, 1);
+  EXPECT_TRUE(service_->not_ready_because());
+  service_.reset();
+  open();
+  EXPECT_TRUE(service_->volume(volume.id));
+  EXPECT_TRUE(service_->submit(order_for(volume.id)));
 }
 
 TEST_F(JobServiceTest, SaysWhenItIsReady) {
