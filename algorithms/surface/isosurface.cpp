@@ -1,5 +1,8 @@
 #include "algorithms/surface/isosurface.h"
 
+#include <limits>
+#include <string>
+
 #include "algorithms/surface/cell_cases.h"
 #include "algorithms/surface/cut_rows.h"
 #include "algorithms/surface/vertex_geometry.h"
@@ -55,11 +58,21 @@ std::vector<std::int64_t> first_triangles(const CutRows& cut, const CellRows& ro
   return first;
 }
 
+/// Throws when the mesh is beyond its numbers or its limit of memory.
+void check_size(std::int64_t vertices, std::int64_t triangles, std::int64_t max_bytes) {
+  if (triangles > std::numeric_limits<std::uint32_t>::max()) {
+    throw std::length_error("an isosurface of more than 2^32 - 1 triangles");
+  }
+  constexpr std::int64_t kPerVertex = 2 * sizeof(Float3) + sizeof(float);
+  constexpr std::int64_t kPerTriangle = sizeof(Triangle) + sizeof(std::uint8_t);
+  const std::int64_t needed = kPerVertex * vertices + kPerTriangle * triangles;
+  if (max_bytes > 0 && needed > max_bytes) throw SurfaceTooLarge(needed, max_bytes);
+}
+
 /// `flip`: voxel indices are left-handed in the world, so the other order is counter-clockwise there.
-void write_triangles(const VertexNumbers& numbers, bool flip, Mesh& mesh, const Progress& report) {
+void write_triangles(const VertexNumbers& numbers, const CellRows& rows,
+                     const std::vector<std::int64_t>& first, bool flip, Mesh& mesh, const Progress& report) {
   const CutRows& cut = numbers.cut();
-  const CellRows rows(cut);
-  const std::vector<std::int64_t> first = first_triangles(cut, rows, part_of(report, 0, 0.5));
   mesh.triangles.resize(static_cast<std::size_t>(first.back()));
   mesh.triangle_on_cap.resize(mesh.triangles.size());
 
@@ -79,7 +92,7 @@ void write_triangles(const VertexNumbers& numbers, bool flip, Mesh& mesh, const 
           }
         });
       },
-      part_of(report, 0.5, 1));
+      report);
 }
 
 void write_vertices(const VertexNumbers& numbers, const VertexGeometry& geometry, Mesh& mesh,
@@ -122,6 +135,12 @@ void write_vertices(const VertexNumbers& numbers, const VertexGeometry& geometry
 
 }  // namespace
 
+SurfaceTooLarge::SurfaceTooLarge(std::int64_t needed, std::int64_t allowed)
+    : std::length_error("an isosurface of " + std::to_string(needed) + " bytes, beyond the limit of " +
+                        std::to_string(allowed)),
+      needed_bytes(needed),
+      limit(allowed) {}
+
 Mesh extract_isosurface(const Volume& volume, const VoxelToWorld& map, double isovalue,
                         const IsosurfaceOptions& options, const Progress& report) {
   Mesh mesh;
@@ -132,7 +151,10 @@ Mesh extract_isosurface(const Volume& volume, const VoxelToWorld& map, double is
   }
   const CutRows cut(volume, isovalue, options.closed, part_of(report, 0, 0.2));
   const VertexNumbers numbers(cut, part_of(report, 0.2, 0.3));
-  write_triangles(numbers, determinant(map.linear) < 0, mesh, part_of(report, 0.3, 0.5));
+  const CellRows rows(cut);
+  const auto first = first_triangles(cut, rows, part_of(report, 0.3, 0.4));
+  check_size(numbers.count(), first.back(), options.max_bytes);
+  write_triangles(numbers, rows, first, determinant(map.linear) < 0, mesh, part_of(report, 0.4, 0.5));
   write_vertices(numbers, VertexGeometry(volume, map, isovalue), mesh, part_of(report, 0.5, 1));
   return mesh;
 }

@@ -246,6 +246,20 @@ TEST(Isosurface, HasUnitNormalsAndBoundedCurvatureOnNoise) {
   }
 }
 
+TEST(Isosurface, IsRefusedBeyondItsLimitOfMemoryToTheByte) {
+  const Scene scene(scaling(1, 1, 1), 29, ball);
+  const Mesh mesh = scene.surface();
+  const auto bytes = static_cast<std::int64_t>(28 * mesh.positions.size() + 13 * mesh.triangles.size());
+  EXPECT_EQ(scene.surface(0, {.max_bytes = bytes}).triangles, mesh.triangles);
+  try {
+    scene.surface(0, {.max_bytes = bytes - 1});
+    FAIL() << "not refused";
+  } catch (const SurfaceTooLarge& refused) {
+    EXPECT_EQ(refused.needed_bytes, bytes);
+    EXPECT_EQ(refused.limit, bytes - 1);
+  }
+}
+
 TEST(Isosurface, CanBeCancelledAnyTime) {
   const Scene scene(scaling(1, 1, 1), 29, ball);
   for (double when : {0.0, 0.25, 0.45, 0.9}) {
