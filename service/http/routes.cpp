@@ -13,7 +13,7 @@ namespace {
 using Kind = QueryParameter::Kind;
 
 constexpr std::string_view kJson = "application/json";
-constexpr std::size_t kMaxQueryText = 256;
+constexpr std::size_t kMaxQueryText = 1024;  // a label has 200 characters of up to 4 bytes
 constexpr double kLargestInteger = 2147483647;
 
 std::vector<Route> make_routes() {
@@ -182,7 +182,8 @@ tl::expected<void, Problem> check_value(const QueryParameter& parameter, std::st
       if (!parameter.choices.empty() &&
           std::ranges::find(parameter.choices, value) == parameter.choices.end())
         return bad_query(parameter, "one of: " + joined(parameter.choices));
-      if (value.size() > kMaxQueryText) return bad_query(parameter, "at most 256 bytes long");
+      if (value.size() > kMaxQueryText)
+        return bad_query(parameter, "at most " + std::to_string(kMaxQueryText) + " bytes long");
   }
   return {};
 }

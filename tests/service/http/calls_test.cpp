@@ -122,6 +122,17 @@ TEST_F(Calls, ListIsPagedAndFiltered) {
   EXPECT_EQ(json::parse(ask("GET /v1/jobs?method=laplacian").body).at("jobs").size(), 0);
 }
 
+TEST_F(Calls, ListFindsTheLongestLabel) {
+  std::string label, escaped;
+  for (int i = 0; i < 200; ++i) {
+    label += "\xF0\x9F\xA7\xA0";  // four bytes, one character
+    escaped += "%F0%9F%A7%A0";
+  }
+  ASSERT_EQ(submit(upload(), label).status, 202);
+  EXPECT_EQ(json::parse(ask("GET /v1/jobs?label=" + escaped).body).at("jobs").size(), 1);
+  EXPECT_EQ(slug(ask("GET /v1/jobs?label=" + std::string(1025, 'a'))), "bad-query");
+}
+
 struct OrderCase {
   std::string order, slug;
   int status;
