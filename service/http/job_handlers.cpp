@@ -33,6 +33,28 @@ tl::expected<Job, Problem> submit_text(Api& api, const std::string& text) {
   });
 }
 
+/// A volume that is deleted again unless a job takes it.
+class VolumeForAJob {
+ public:
+  VolumeForAJob(JobService& jobs, std::string id) : jobs_(jobs), id_(std::move(id)) {}
+  ~VolumeForAJob() {
+    if (taken_) return;
+    try {
+      (void)jobs_.delete_volume(id_);
+    } catch (const std::exception&) {  // the store that failed the job has failed again
+    }
+  }
+  VolumeForAJob(const VolumeForAJob&) = delete;
+  VolumeForAJob& operator=(const VolumeForAJob&) = delete;
+
+  void taken() { taken_ = true; }
+
+ private:
+  JobService& jobs_;
+  std::string id_;
+  bool taken_ = false;
+};
+
 /// Keeps the volume of a form and submits the order for it; leaves no volume behind without a job.
 tl::expected<Job, Problem> submit_form(Api& api, Request& request) {
   auto document = parse_json(request.text);
@@ -43,9 +65,10 @@ tl::expected<Job, Problem> submit_form(Api& api, Request& request) {
 
   const auto volume = api.jobs.keep_volume(std::move(*request.file), {});
   if (!volume) return tl::unexpected(volume.error());
+  VolumeForAJob unclaimed(api.jobs, volume->id);
   if (document->is_object()) (*document)["volume"] = volume->id;
   auto job = order_from(*document).and_then([&](const JobOrder& order) { return api.jobs.submit(order); });
-  if (!job) (void)api.jobs.delete_volume(volume->id);
+  if (job) unclaimed.taken();
   return job;
 }
 

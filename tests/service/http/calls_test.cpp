@@ -187,6 +187,20 @@ TEST_F(Calls, FailedFormLeavesNoVolumeBehind) {
   EXPECT_TRUE(jobs_.volumes().empty());
 }
 
+TEST_F(Calls, FormWhoseSubmissionBreaksLeavesNoVolumeBehind) {
+  auto engine = engine_.engine();
+  engine.plan = [](const JobOrder&, const VolumeFacts&) -> tl::expected<JobPlan, Problem> {
+    throw std::runtime_error("broken");
+  };
+  const ScratchFolder directory;
+  JobService jobs({.data_dir = directory.path()}, engine);
+  server_.reset();
+  server_.emplace(ServerSettings{.listen = "127.0.0.1:0"}, Api{jobs, metrics_});
+  EXPECT_EQ(ask("POST /v1/jobs", form("voxels", "{}"), kFormType).status, 503);
+  EXPECT_TRUE(jobs.volumes().empty());
+  server_.reset();
+}
+
 TEST_F(Calls, VolumeMayComeAsAForm) {
   const auto answer =
       ask("POST /v1/volumes", "--B\r\nContent-Disposition: form-data; name=\"volume\"\r\n\r\nabc\r\n--B--",
