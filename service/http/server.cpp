@@ -28,6 +28,7 @@ using boost::system::error_code;
 
 constexpr std::string_view kUnixPrefix = "unix:";
 constexpr int kQuickThreads = 4;
+constexpr int kBulkThreads = 4;
 constexpr int kVerifyingThreads = 2;
 constexpr auto kGrace = std::chrono::seconds(5);
 constexpr auto kPauseAfterAcceptFailure = std::chrono::milliseconds(100);
@@ -112,7 +113,8 @@ std::string too_many_connections() {
 
 struct Server::State {
   State(ServerSettings given, Api api)
-      : settings(std::move(given)), context{settings, api, {}, body_rules(settings, api), quick, verifying} {
+      : settings(std::move(given)), context{settings, api,  {},       body_rules(settings, api),
+                                            quick,    bulk, verifying} {
     for (const auto& name : settings.host_names) context.hosts.names.push_back(lowered(name));
     listen();
     thread = std::jthread([this] { io.run(); });
@@ -211,6 +213,7 @@ struct Server::State {
   asio::io_context io{1};
   // Gone before the I/O context: their threads hand results to it.
   ThreadPool quick{kQuickThreads, ThreadPool::Priority::kNormal};
+  ThreadPool bulk{kBulkThreads, ThreadPool::Priority::kNormal};
   ThreadPool verifying{kVerifyingThreads, ThreadPool::Priority::kLow};
   std::jthread thread;
 };

@@ -56,7 +56,7 @@ Session::Awaitable<bool> Session::serve_one() {
   exchange.record.id = ++context_.last_request;
   const auto start = std::chrono::steady_clock::now();
   co_await serve(exchange);
-  if (exchange.request.file) co_await context_.quick.run([&] { exchange.request.file.reset(); });
+  if (exchange.request.file) co_await context_.bulk.run([&] { exchange.request.file.reset(); });
 
   auto& record = exchange.record;
   record.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -162,12 +162,13 @@ Session::Awaitable<tl::expected<void, Problem>> Session::receive_body(Exchange& 
 
   const auto wanted = std::min<std::int64_t>(head.content_length.value_or(kBodyBlockBytes), kBodyBlockBytes);
   std::vector<char> block(static_cast<std::size_t>(head.has_body() ? wanted : 1));
+  ThreadPool& pool = exchange.request.file ? context_.bulk : context_.quick;
   for (;;) {
     const auto bytes = co_await connection_.read_body(block, context_.settings.body_seconds);
     if (!bytes) co_return tl::unexpected(problem_of(bytes.error()));
     if (bytes->empty()) co_return tl::expected<void, Problem>();
     exchange.record.bytes_in += static_cast<std::int64_t>(bytes->size());
-    auto taken = co_await run_guarded(context_.quick, exchange, [&] { return receiver.receive(*bytes); });
+    auto taken = co_await run_guarded(pool, exchange, [&] { return receiver.receive(*bytes); });
     if (!taken) co_return taken;
   }
 }

@@ -21,7 +21,8 @@ struct SessionContext {
   Api api;
   HostNames hosts;
   BodyRules body_rules;
-  ThreadPool& quick;      ///< for the store and the disk: milliseconds
+  ThreadPool& quick;      ///< for the store: milliseconds
+  ThreadPool& bulk;       ///< for the bytes of files: as slow as the disk
   ThreadPool& verifying;  ///< for handlers that were given a file: seconds
   std::uint64_t last_request = 0;
   bool stopping = false;

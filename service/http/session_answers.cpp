@@ -86,7 +86,7 @@ Session::Awaitable<bool> Session::send_file(Exchange& exchange, const FileBody& 
     if (!co_await write(exchange, piece.prefix)) co_return false;
     for (std::int64_t done = 0; done < piece.length; done += kFileBlockBytes) {
       block.resize(static_cast<std::size_t>(std::min(kFileBlockBytes, piece.length - done)));
-      const auto read = co_await run_guarded(context_.quick, exchange, [&]() -> tl::expected<void, Problem> {
+      const auto read = co_await run_guarded(context_.bulk, exchange, [&]() -> tl::expected<void, Problem> {
         body.file->read(piece.offset + done, block);
         return {};
       });
