@@ -35,7 +35,7 @@ class HttpClient {
   explicit HttpClient(const std::string& address) {
     const bool is_unix = address.starts_with("unix:");
     descriptor_ = ::socket(is_unix ? AF_UNIX : AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    const timeval patience{10, 0};
+    const timeval patience{60, 0};  // a hang, not a measure
     ::setsockopt(descriptor_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
     if (is_unix ? !connect_unix(address.substr(5)) : !connect_tcp(address.substr(7)))
       throw std::runtime_error("cannot connect to " + address);

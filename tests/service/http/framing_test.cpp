@@ -195,7 +195,7 @@ TEST_F(Framing, StalledHeadAndBodyMeetTheirDeadlines) {
 }
 
 TEST_F(Framing, IdleConnectionIsClosedWithoutAWord) {
-  start({.listen = "127.0.0.1:0", .idle_seconds = 0.1});
+  start({.listen = "127.0.0.1:0", .idle_seconds = 2});
   auto client = connect();
   EXPECT_EQ(client.exchange(request("GET /healthz")).status, 200);
   EXPECT_TRUE(client.is_closed());
