@@ -5,6 +5,7 @@
 
 #include "algorithms/surface/measures.h"
 #include "algorithms/surface/morton_order.h"
+#include "algorithms/surface/serial_for.h"
 #include "algorithms/surface/triangle_tree.h"
 #include "algorithms/surface/triangles_at_vertices.h"
 #include "algorithms/surface/vector_math.h"
@@ -16,21 +17,33 @@ namespace {
 constexpr std::int64_t kPerChunk = 1 << 11;
 
 /// Triangles that are no caps. A cap says where the volume ends, not where the surface is.
-std::vector<std::uint32_t> free_triangles(const Mesh& mesh) {
+std::vector<std::uint32_t> free_triangles(const Mesh& mesh, const Progress& report) {
   std::vector<std::uint32_t> chosen;
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    if (mesh.triangle_on_cap[t] == 0) chosen.push_back(static_cast<std::uint32_t>(t));
-  }
+  serial_for(
+      mesh.triangles.size(),
+      [&](std::size_t begin, std::size_t end) {
+        for (std::size_t t = begin; t < end; ++t) {
+          if (mesh.triangle_on_cap[t] == 0) chosen.push_back(static_cast<std::uint32_t>(t));
+        }
+      },
+      report);
   return chosen;
 }
 
 /// A third of the area of the triangles without caps round every vertex.
-std::vector<double> vertex_areas(const Mesh& mesh) {
-  std::vector<double> areas(mesh.positions.size());
-  for (std::uint32_t t : free_triangles(mesh)) {
-    const double area = 0.5 * length(area_normal(corners_of(mesh, mesh.triangles[t])));
-    for (std::uint32_t vertex : mesh.triangles[t]) areas[vertex] += area / 3;
-  }
+std::vector<double> vertex_areas(const Mesh& mesh, const Progress& report) {
+  std::vector<double> areas;
+  grow(areas, mesh.positions.size(), part_of(report, 0, 0.1));
+  serial_for(
+      mesh.triangles.size(),
+      [&](std::size_t begin, std::size_t end) {
+        for (std::size_t t = begin; t < end; ++t) {
+          if (mesh.triangle_on_cap[t] != 0) continue;
+          const double area = 0.5 * length(area_normal(corners_of(mesh, mesh.triangles[t])));
+          for (std::uint32_t vertex : mesh.triangles[t]) areas[vertex] += area / 3;
+        }
+      },
+      part_of(report, 0.1, 1));
   return areas;
 }
 
@@ -94,11 +107,11 @@ struct Part {
 }  // namespace
 
 std::optional<Displacement> displacement(const Mesh& moved, const Mesh& original, const Progress& report) {
-  std::vector<std::uint32_t> triangles = free_triangles(original);
+  std::vector<std::uint32_t> triangles = free_triangles(original, part_of(report, 0, 0.02));
   if (triangles.empty()) return std::nullopt;
   const std::uint32_t start = triangles.front();
-  const std::vector<double> areas = vertex_areas(moved);
-  const SignedDistance distance(original, std::move(triangles), part_of(report, 0, 0.15));
+  const std::vector<double> areas = vertex_areas(moved, part_of(report, 0.02, 0.05));
+  const SignedDistance distance(original, std::move(triangles), part_of(report, 0.05, 0.15));
 
   // Along the curve the nearest triangle of one vertex is a good guess for the next.
   const std::vector<std::uint32_t> order = morton_order(moved.positions, part_of(report, 0.15, 0.2));

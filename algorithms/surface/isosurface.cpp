@@ -5,6 +5,7 @@
 
 #include "algorithms/surface/cell_cases.h"
 #include "algorithms/surface/cut_rows.h"
+#include "algorithms/surface/serial_for.h"
 #include "algorithms/surface/vertex_geometry.h"
 #include "algorithms/surface/vertex_numbers.h"
 #include "algorithms/volume/parallel.h"
@@ -73,8 +74,8 @@ void check_size(std::int64_t vertices, std::int64_t triangles, std::int64_t max_
 void write_triangles(const VertexNumbers& numbers, const CellRows& rows,
                      const std::vector<std::int64_t>& first, bool flip, Mesh& mesh, const Progress& report) {
   const CutRows& cut = numbers.cut();
-  mesh.triangles.resize(static_cast<std::size_t>(first.back()));
-  mesh.triangle_on_cap.resize(mesh.triangles.size());
+  grow(mesh.triangles, static_cast<std::size_t>(first.back()), part_of(report, 0, 0.3));
+  grow(mesh.triangle_on_cap, mesh.triangles.size(), part_of(report, 0.3, 0.4));
 
   const auto& cases = cell_cases();
   rows.for_each(
@@ -92,15 +93,15 @@ void write_triangles(const VertexNumbers& numbers, const CellRows& rows,
           }
         });
       },
-      report);
+      part_of(report, 0.4, 1));
 }
 
 void write_vertices(const VertexNumbers& numbers, const VertexGeometry& geometry, Mesh& mesh,
                     const Progress& report) {
   const CutRows& cut = numbers.cut();
-  mesh.positions.resize(numbers.count());
-  mesh.normals.resize(numbers.count());
-  mesh.curvatures.resize(numbers.count());
+  grow(mesh.positions, numbers.count(), part_of(report, 0, 0.05));
+  grow(mesh.normals, numbers.count(), part_of(report, 0.05, 0.1));
+  grow(mesh.curvatures, numbers.count(), part_of(report, 0.1, 0.12));
   const auto write_row = [&](std::int64_t y, std::int64_t z) {
     std::size_t next = numbers.row(y, z).on_edges[0];
     const auto write = [&](const SurfaceVertex& vertex) {
@@ -130,7 +131,7 @@ void write_vertices(const VertexNumbers& numbers, const VertexGeometry& geometry
       [&](std::int64_t begin, std::int64_t end) {
         for (std::int64_t r = begin; r < end; ++r) write_row(r % rows, r / rows);
       },
-      report);
+      part_of(report, 0.12, 1));
 }
 
 }  // namespace

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <span>
 
+#include "algorithms/surface/serial_for.h"
 #include "algorithms/surface/triangles_at_vertices.h"
 #include "algorithms/surface/vector_math.h"
 #include "algorithms/volume/parallel.h"
@@ -99,22 +101,26 @@ Connections connect(const Mesh& mesh, const TrianglesAtVertices& triangles, std:
 
 /// Joins the vertices of each triangle in a forest whose trees are the components.
 std::int64_t count_components(const Mesh& mesh, std::int64_t vertices, const Progress& report) {
-  std::vector<std::uint32_t> parent(mesh.positions.size());
+  std::vector<std::uint32_t> parent;
+  grow(parent, mesh.positions.size(), part_of(report, 0, 0.1));
   std::iota(parent.begin(), parent.end(), 0U);
   const auto root_of = [&parent](std::uint32_t vertex) {
     while (parent[vertex] != vertex) vertex = parent[vertex] = parent[parent[vertex]];
     return vertex;
   };
   std::int64_t joined = 0;
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    if (t % (1 << 18) == 0) report(static_cast<double>(t) / static_cast<double>(mesh.triangles.size()));
-    const Triangle& triangle = mesh.triangles[t];
-    for (std::size_t side = 0; side < 2; ++side) {
-      const std::uint32_t a = root_of(triangle[side]), b = root_of(triangle[side + 1]);
-      joined += a == b ? 0 : 1;
-      parent[std::max(a, b)] = std::min(a, b);
-    }
-  }
+  serial_for(
+      mesh.triangles.size(),
+      [&](std::size_t begin, std::size_t end) {
+        for (const Triangle& triangle : std::span(mesh.triangles).subspan(begin, end - begin)) {
+          for (std::size_t side = 0; side < 2; ++side) {
+            const std::uint32_t a = root_of(triangle[side]), b = root_of(triangle[side + 1]);
+            joined += a == b ? 0 : 1;
+            parent[std::max(a, b)] = std::min(a, b);
+          }
+        }
+      },
+      part_of(report, 0.1, 1));
   return vertices - joined;
 }
 

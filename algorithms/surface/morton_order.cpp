@@ -4,6 +4,7 @@
 #include <limits>
 #include <utility>
 
+#include "algorithms/surface/serial_for.h"
 #include "algorithms/volume/parallel.h"
 
 namespace volsmooth {
@@ -23,26 +24,39 @@ std::uint64_t spread(std::uint64_t place) {
 
 using Keyed = std::pair<std::uint64_t, std::uint32_t>;  // a place on the curve, the number of a point
 
-std::vector<Keyed> places_on_curve(std::span<const Float3> points) {
+std::vector<Keyed> places_on_curve(std::span<const Float3> points, const Progress& report) {
   Float3 low = points.front(), high = low;
-  for (const Float3& point : points) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      low[axis] = std::min(low[axis], point[axis]);
-      high[axis] = std::max(high[axis], point[axis]);
-    }
-  }
+  serial_for(
+      points.size(),
+      [&](std::size_t begin, std::size_t end) {
+        for (const Float3& point : points.subspan(begin, end - begin)) {
+          for (std::size_t axis = 0; axis < 3; ++axis) {
+            low[axis] = std::min(low[axis], point[axis]);
+            high[axis] = std::max(high[axis], point[axis]);
+          }
+        }
+      },
+      part_of(report, 0, 0.3));
   const float extent =
       std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2], std::numeric_limits<float>::min()});
-  std::vector<Keyed> keyed(points.size());
-  for (std::size_t p = 0; p < points.size(); ++p) {
+  const auto key_of = [&](const Float3& point) {
     std::uint64_t key = 0;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto place =
-          static_cast<std::uint64_t>((points[p][axis] - low[axis]) / extent * float{kLastPlace});
+      const auto place = static_cast<std::uint64_t>((point[axis] - low[axis]) / extent * float{kLastPlace});
       key |= spread(std::min(place, kLastPlace)) << axis;
     }
-    keyed[p] = {key, static_cast<std::uint32_t>(p)};
-  }
+    return key;
+  };
+  std::vector<Keyed> keyed;
+  grow(keyed, points.size(), part_of(report, 0.3, 0.5));
+  parallel_for(
+      static_cast<std::int64_t>(points.size()), 1 << 16,
+      [&](std::int64_t begin, std::int64_t end) {
+        for (auto p = static_cast<std::size_t>(begin); p < static_cast<std::size_t>(end); ++p) {
+          keyed[p] = {key_of(points[p]), static_cast<std::uint32_t>(p)};
+        }
+      },
+      part_of(report, 0.5, 1));
   return keyed;
 }
 
@@ -50,18 +64,26 @@ std::vector<Keyed> places_on_curve(std::span<const Float3> points) {
 
 std::vector<std::uint32_t> morton_order(std::span<const Float3> points, const Progress& report) {
   if (points.empty()) return {};
-  const std::vector<Keyed> keyed = places_on_curve(points);
-  report(0.2);
+  const std::vector<Keyed> keyed = places_on_curve(points, part_of(report, 0, 0.2));
 
   // A counting sort by the first 12 of the 60 bits, then each part by itself: parallel, and soon cancelled.
   constexpr std::size_t kParts = std::size_t{1} << 12;
   const auto part_of_key = [](std::uint64_t key) { return static_cast<std::size_t>(key >> 48); };
   std::vector<std::size_t> first(kParts + 2);
-  for (const Keyed& one : keyed) ++first[part_of_key(one.first) + 2];
+  const auto for_each_key = [&keyed](const auto& visit, const Progress& counting) {
+    serial_for(
+        keyed.size(),
+        [&](std::size_t begin, std::size_t end) {
+          std::ranges::for_each(std::span(keyed).subspan(begin, end - begin), visit);
+        },
+        counting);
+  };
+  for_each_key([&](const Keyed& one) { ++first[part_of_key(one.first) + 2]; }, part_of(report, 0.2, 0.25));
   for (std::size_t part = 2; part < first.size(); ++part) first[part] += first[part - 1];
-  std::vector<Keyed> sorted(keyed.size());
-  for (const Keyed& one : keyed) sorted[first[part_of_key(one.first) + 1]++] = one;
-  report(0.4);
+  std::vector<Keyed> sorted;
+  grow(sorted, keyed.size(), part_of(report, 0.25, 0.3));
+  for_each_key([&](const Keyed& one) { sorted[first[part_of_key(one.first) + 1]++] = one; },
+               part_of(report, 0.3, 0.4));
   parallel_for(
       kParts, 16,
       [&](std::int64_t begin, std::int64_t end) {

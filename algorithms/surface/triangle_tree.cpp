@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "algorithms/surface/morton_order.h"
+#include "algorithms/surface/serial_for.h"
 #include "algorithms/surface/vector_math.h"
 #include "algorithms/volume/parallel.h"
 
@@ -16,11 +17,18 @@ constexpr std::size_t kLeafSize = 4;
 constexpr std::int64_t kPerChunk = 1 << 14;
 
 void sort_by_place(const Mesh& mesh, std::vector<std::uint32_t>& triangles, const Progress& report) {
-  std::vector<Float3> corners(triangles.size());
-  std::ranges::transform(triangles, corners.begin(),
-                         [&mesh](std::uint32_t t) { return mesh.positions[mesh.triangles[t][0]]; });
+  std::vector<Float3> corners;
+  corners.reserve(triangles.size());
+  serial_for(
+      triangles.size(),
+      [&](std::size_t begin, std::size_t end) {
+        for (std::size_t k = begin; k < end; ++k) {
+          corners.push_back(mesh.positions[mesh.triangles[triangles[k]][0]]);
+        }
+      },
+      part_of(report, 0, 0.2));
   const std::vector<std::uint32_t> unsorted = triangles;
-  std::ranges::transform(morton_order(corners, report), triangles.begin(),
+  std::ranges::transform(morton_order(corners, part_of(report, 0.2, 1)), triangles.begin(),
                          [&](std::uint32_t k) { return unsorted[k]; });
 }
 
@@ -65,12 +73,15 @@ TriangleTree::TriangleTree(const Mesh& mesh, std::vector<std::uint32_t> chosen, 
       triangles_(std::move(chosen)),
       leaves_(std::bit_ceil((triangles_.size() + kLeafSize - 1) / kLeafSize)),
       boxes_(2 * leaves_) {
-  sort_by_place(mesh_, triangles_, report);
-  parallel_for(static_cast<std::int64_t>(leaves_), kPerChunk, [&](std::int64_t begin, std::int64_t end) {
-    for (auto leaf = static_cast<std::size_t>(begin); leaf < static_cast<std::size_t>(end); ++leaf) {
-      boxes_[leaves_ + leaf] = box_of_leaf(leaf);
-    }
-  });
+  sort_by_place(mesh_, triangles_, part_of(report, 0, 0.8));
+  parallel_for(
+      static_cast<std::int64_t>(leaves_), kPerChunk,
+      [&](std::int64_t begin, std::int64_t end) {
+        for (auto leaf = static_cast<std::size_t>(begin); leaf < static_cast<std::size_t>(end); ++leaf) {
+          boxes_[leaves_ + leaf] = box_of_leaf(leaf);
+        }
+      },
+      part_of(report, 0.8, 1));
   for (std::size_t node = leaves_ - 1; node > 0; --node) {
     const Box &left = boxes_[2 * node], &right = boxes_[2 * node + 1];
     for (std::size_t axis = 0; axis < 3; ++axis) {

@@ -1,24 +1,32 @@
 #include "algorithms/surface/triangles_at_vertices.h"
 
+#include "algorithms/surface/serial_for.h"
+
 namespace volsmooth {
 
-TrianglesAtVertices::TrianglesAtVertices(const Mesh& mesh, const Progress& report)
-    : first_(mesh.positions.size() + 2), triangles_(3 * mesh.triangles.size()) {
-  constexpr std::size_t kBetweenReports = std::size_t{1} << 18;
+TrianglesAtVertices::TrianglesAtVertices(const Mesh& mesh, const Progress& report) {
+  grow(first_, mesh.positions.size() + 2, part_of(report, 0, 0.1));
+  grow(triangles_, 3 * mesh.triangles.size(), part_of(report, 0.1, 0.2));
   // A counting sort. The counts stand two places further on, so that after filling each start is in place.
-  for (const Triangle& triangle : mesh.triangles) {
-    for (std::uint32_t vertex : triangle) ++first_[std::size_t{vertex} + 2];
-  }
-  report(0.3);
+  serial_for(
+      mesh.triangles.size(),
+      [&](std::size_t begin, std::size_t end) {
+        for (std::size_t t = begin; t < end; ++t) {
+          for (std::uint32_t vertex : mesh.triangles[t]) ++first_[std::size_t{vertex} + 2];
+        }
+      },
+      part_of(report, 0.2, 0.5));
   for (std::size_t v = 2; v < first_.size(); ++v) first_[v] += first_[v - 1];
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    if (t % kBetweenReports == 0) {
-      report(0.3 + 0.7 * static_cast<double>(t) / static_cast<double>(mesh.triangles.size()));
-    }
-    for (std::uint32_t vertex : mesh.triangles[t]) {
-      triangles_[first_[std::size_t{vertex} + 1]++] = static_cast<std::uint32_t>(t);
-    }
-  }
+  serial_for(
+      mesh.triangles.size(),
+      [&](std::size_t begin, std::size_t end) {
+        for (std::size_t t = begin; t < end; ++t) {
+          for (std::uint32_t vertex : mesh.triangles[t]) {
+            triangles_[first_[std::size_t{vertex} + 1]++] = static_cast<std::uint32_t>(t);
+          }
+        }
+      },
+      part_of(report, 0.5, 1));
 }
 
 }  // namespace volsmooth
