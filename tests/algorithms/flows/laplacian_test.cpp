@@ -40,7 +40,7 @@ double largest_error_of_gaussian(const Vector3& spacing) {
 TEST(Laplacian, WidensAGaussianByTwiceTheFlowTimeAtSecondOrder) {
   const double coarse = largest_error_of_gaussian({1, 1, 1}),
                fine = largest_error_of_gaussian({0.5, 0.5, 0.5});
-  EXPECT_LT(coarse, 4e-3);
+  EXPECT_LT(coarse, 8.6e-4);  // 1.3 x the measured 6.63e-4
   EXPECT_GT(std::log2(coarse / fine), 1.8);
 }
 
@@ -48,11 +48,12 @@ TEST(Laplacian, WidensAGaussianByTwiceTheFlowTimeAtSecondOrder) {
 TEST(Laplacian, WidensAGaussianOnOtherVoxelsAtSecondOrder) {
   const double coarse = largest_error_of_gaussian({1, 1, 2.5}),
                fine = largest_error_of_gaussian({0.5, 0.5, 1.25});
-  EXPECT_LT(coarse, 1.2e-2);
+  EXPECT_LT(coarse, 6.8e-3);  // 1.3 x the measured 5.25e-3
   EXPECT_GT(std::log2(coarse / fine), 1.7);
 }
 
-/// A cosine that fits the mirrored box is an eigenvector: each step multiplies it by the same factor.
+/// A cosine that fits the mirrored box is an eigenvector: each step multiplies it by the same factor, and
+/// rounds by less than 2^-24, since its values are at most 1.
 TEST(Laplacian, DampsACosineByTheFactorOfTheStencil) {
   const Grid grid{{16, 3, 2}, {1.5, 1, 2}};
   const double wave = std::numbers::pi * 3 / 16;
@@ -64,7 +65,7 @@ TEST(Laplacian, DampsACosineByTheFactorOfTheStencil) {
   const double factor = std::pow(1 - steps.step_mm2 * (2 - 2 * std::cos(wave)) / (1.5 * 1.5), steps.steps);
   const auto out = smoothed(grid, cosine, 5);
   for (std::size_t voxel = 0; voxel < out.size(); ++voxel)
-    ASSERT_NEAR(out[voxel], factor * cosine[voxel], 1e-5);
+    ASSERT_NEAR(out[voxel], factor * cosine[voxel], static_cast<double>(steps.steps) * 0x1p-24);
 }
 
 /// Each step rounds every voxel by half a unit in the last place at most, 2^-14 for values below 1024; the
@@ -87,7 +88,7 @@ TEST(Laplacian, KeepsTheRangeOfAnyFloats) {
   }
 }
 
-/// At twice the step, the pattern would change its sign for ever.
+/// At twice the step, the pattern would change its sign for ever. 1.3 x the measured 0.0238.
 TEST(Laplacian, DampsNoiseThatAlternatesFromVoxelToVoxel) {
   const Grid grid{{10, 10, 10}, {1, 1, 1}};
   std::vector<float> checkers;
@@ -95,14 +96,15 @@ TEST(Laplacian, DampsNoiseThatAlternatesFromVoxelToVoxel) {
     checkers.push_back((i[0] + i[1] + i[2]) % 2 == 0 ? 1.0F : -1.0F);
   });
   const auto out = smoothed(grid, checkers, 1);
-  EXPECT_LT(std::ranges::max(out), 0.05F);
+  EXPECT_LT(std::ranges::max(out), 0.031F);
 }
 
 TEST(Laplacian, FillsTheBoxEvenlyInTheEnd) {
   const Grid grid{{6, 1, 4}, {1, 1, 1}};
   const auto before = noise(grid.size, 4, 0, 100);
   const double mean = sum_of(before) / static_cast<double>(before.size());
-  for (const float value : smoothed(grid, before, 100)) ASSERT_NEAR(value, mean, 1e-3);
+  for (const float value : smoothed(grid, before, 100))
+    ASSERT_NEAR(value, mean, 1.35e-4);  // 1.3 x the measured 1.04e-4
 }
 
 }  // namespace

@@ -115,7 +115,7 @@ TEST(MeanCurvatureFlow, InDoubleConvergesLikeInFloat) {
   EXPECT_NEAR(fine_error, fast_error(fine), 1e-5);
 }
 
-/// A cylinder of radius r moves at 1/r: f(sqrt(r^2 + 2 t)), along any axis.
+/// A cylinder of radius r moves at 1/r: f(sqrt(r^2 + 2 t)), along any axis. 1.3 x the measured 0.738 %.
 TEST(MeanCurvatureFlow, CylindersShrinkHalfAsFastAsSpheres) {
   constexpr double kTime = 6;
   const auto f = soft_step(14, 4, 1000);
@@ -129,7 +129,7 @@ TEST(MeanCurvatureFlow, CylindersShrinkHalfAsFastAsSpheres) {
     };
     const auto out = smoothed(grid, sampled(grid, [&](const Vector3& x) { return f(across(x)); }), kTime);
     const auto exact = [&](const Vector3& x) { return f(std::sqrt(across(x) * across(x) + 2 * kTime)); };
-    EXPECT_LT(error_of(grid, out, exact, [](const Vector3&) { return true; }).largest, 0.012 * 1000)
+    EXPECT_LT(error_of(grid, out, exact, [](const Vector3&) { return true; }).largest, 0.0096 * 1000)
         << "along axis " << along;
   }
 }
@@ -341,7 +341,8 @@ TEST(MeanCurvatureFlow, CommutesWithSwappingEqualAxesToTheBit) {
   EXPECT_EQ(smoothed(kBox, rearranged(before, swap), 4), rearranged(smoothed(kBox, before, 4), swap));
 }
 
-/// The order of a sum of three rounds differently.
+/// The order of a sum of three rounds differently. 1.3 x the measured 2^-14, the last digit of values below
+/// 1024.
 TEST(MeanCurvatureFlow, CommutesWithTurningTheAxesToRounding) {
   const Grid turned{{kBox.size[2], kBox.size[0], kBox.size[1]},
                     {kBox.spacing_mm[2], kBox.spacing_mm[0], kBox.spacing_mm[1]}};
@@ -354,7 +355,7 @@ TEST(MeanCurvatureFlow, CommutesWithTurningTheAxesToRounding) {
   for_each_voxel(kBox, [&](const Size3& i, const Vector3&) {
     largest = std::max(largest, std::abs(double{field(i)} - turned_field({i[2], i[0], i[1]})));
   });
-  EXPECT_LT(largest, 1000 * 1e-5);
+  EXPECT_LT(largest, 1.3 * 0x1p-14);
 }
 
 TEST(MeanCurvatureFlow, CommutesWithNegationAndPowersOfTwoToTheBit) {
@@ -369,6 +370,7 @@ TEST(MeanCurvatureFlow, CommutesWithNegationAndPowersOfTwoToTheBit) {
   }
 }
 
+/// 1.3 x the measured 2^-12, the last digit of values below 4096.
 TEST(MeanCurvatureFlow, CommutesWithAnIncreasingAffineRelabellingToRounding) {
   const auto label = [](double rho) { return 3 * rho - 700; };
   auto relabelled = noisy_spheres();
@@ -376,7 +378,7 @@ TEST(MeanCurvatureFlow, CommutesWithAnIncreasingAffineRelabellingToRounding) {
   for (float& value : relabelled) value = static_cast<float>(label(double{value}));
   const auto after_relabelled = smoothed(kBox, relabelled, 4);
   for (std::size_t voxel = 0; voxel < after.size(); ++voxel)
-    ASSERT_NEAR(after_relabelled[voxel], label(double{after[voxel]}), 3000 * 1e-5);
+    ASSERT_NEAR(after_relabelled[voxel], label(double{after[voxel]}), 1.3 * 0x1p-12);
 }
 
 /// The flow time is in mm^2: the same data on voxels k times as large takes k^2 times as long.
