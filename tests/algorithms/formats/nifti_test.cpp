@@ -182,6 +182,28 @@ TEST(Nifti, KeepsTheEndsOfEveryIntegerType) {
   }
 }
 
+/// 2^63 - 1 is no float: below 2^63, floats are 2^39 apart and doubles 2^10, and twice that below 2^64. What
+/// is too large becomes the last double that fits.
+TEST(Nifti, KeepsAndClipsTheEndsOf64Bits) {
+  struct Ends {
+    int datatype;
+    double lowest, highest, clipped;
+  };
+  for (const auto& [datatype, lowest, highest, clipped] :
+       {Ends{1024, -0x1p63, 0x1p63 - 0x1p39, 0x1p63 - 0x1p10},
+        Ends{1280, 0, 0x1p64 - 0x1p40, 0x1p64 - 0x1p11}}) {
+    NiftiFile file{.size = {2, 1, 1}, .datatype = datatype, .voxels = {lowest, highest}};
+    const LoadedVolume loaded = read(file);
+    file.descrip = "volsmooth";
+    EXPECT_EQ(written(loaded).bytes, bytes_of(file)) << datatype;
+    std::ranges::copy(std::array{-3e38F, 3e38F}, voxels_of(*loaded.volume).begin());
+    file.voxels = {lowest, clipped};
+    const Written result = written(loaded);
+    EXPECT_EQ(result.bytes, bytes_of(file)) << datatype;
+    EXPECT_EQ(result.outcome.clipped_voxels, 2);
+  }
+}
+
 // --- geometry ---
 
 TEST(NiftiGeometry, SformWinsOverQform) {
@@ -403,6 +425,21 @@ TEST(NiftiValues, RoundHalfToEvenThenClip) {
                                              .descrip = "volsmooth",
                                              .voxels = {0, 2, 2, 0, 255, 255, 0, 255}}));
   EXPECT_EQ(result.outcome.clipped_voxels, 3);
+}
+
+/// The largest intensity is the lowest stored value.
+TEST(NiftiValues, ANegativeSlopeTurnsTheEndsRound) {
+  NiftiFile file{.size = {6, 1, 1}, .slope = -0.5, .inter = 3, .voxels = {-32768, -1, 0, 1, 2, 32767}};
+  const LoadedVolume loaded = read(file);
+  EXPECT_EQ(loaded.description.intensity_max, 16387);
+  EXPECT_EQ(loaded.description.intensity_min, -16380.5);
+  file.descrip = "volsmooth";
+  EXPECT_EQ(written(loaded).bytes, bytes_of(file));
+  std::ranges::copy(std::array{1e6F, -1e6F, 2.75F, 2.25F, 3.0F, 16387.0F}, voxels_of(*loaded.volume).begin());
+  file.voxels = {-32768, 32767, 0, 2, 0, -32768};
+  const Written result = written(loaded);
+  EXPECT_EQ(result.bytes, bytes_of(file));
+  EXPECT_EQ(result.outcome.clipped_voxels, 2);
 }
 
 TEST(NiftiValues, RoundingIsMeasuredInIntensity) {
