@@ -56,14 +56,15 @@ FoliationMeasures measure(const Volume& volume, const Progress& report) {
   for (std::size_t axis = 0; axis < 3; ++axis) per_mm[axis] = 0.5 / grid.spacing_mm[axis];
 
   const std::int64_t row_count = grid.size[1] * grid.size[2];
-  constexpr std::int64_t kRowsOfChunk = 256;
+  constexpr std::int64_t kVoxelsOfChunk = 1 << 18;
+  const std::int64_t rows_of_chunk = std::clamp<std::int64_t>(kVoxelsOfChunk / grid.size[0], 1, 256);
   const FoliationMeasures none{.minimum = rows.voxels[0], .maximum = rows.voxels[0]};
   std::vector<FoliationMeasures> chunks(
-      static_cast<std::size_t>((row_count + kRowsOfChunk - 1) / kRowsOfChunk), none);
+      static_cast<std::size_t>((row_count + rows_of_chunk - 1) / rows_of_chunk), none);
   parallel_for(
-      row_count, kRowsOfChunk,
+      row_count, rows_of_chunk,
       [&](std::int64_t begin, std::int64_t end) {
-        FoliationMeasures& chunk = chunks[static_cast<std::size_t>(begin / kRowsOfChunk)];
+        FoliationMeasures& chunk = chunks[static_cast<std::size_t>(begin / rows_of_chunk)];
         for (std::int64_t row = begin; row < end; ++row)
           add(chunk, measure_row(rows, per_mm, row % grid.size[1], row / grid.size[1]));
       },

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <numbers>
 
 #include "algorithms/volume/parallel.h"
@@ -58,6 +59,14 @@ TEST(Measure, CanBeCancelled) {
   const Grid grid{{3, 400, 3}, {1, 1, 1}};
   const auto volume = volume_of(grid, noise(grid.size, 1));
   EXPECT_THROW(measure(*volume, [](double) { throw Cancelled(); }), Cancelled);
+}
+
+/// However long the rows are: nobody waits long for a cancelled job.
+TEST(Measure, ReportsAtLeastEveryQuarterOfAMillionVoxels) {
+  const auto volume = make_volume(Grid{{65'536, 16, 1}, {1, 1, 1}});
+  std::atomic<int> reports{0};
+  measure(*volume, [&](double) { ++reports; });
+  EXPECT_EQ(reports, 4);
 }
 
 }  // namespace
