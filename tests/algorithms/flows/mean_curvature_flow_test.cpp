@@ -60,10 +60,11 @@ TEST_P(NestedSpheres, ComeBackOnTheExactFoliation) {
   EXPECT_LT(error_of(grid, out, exact, everywhere).largest, tolerance * 1000);
 }
 
+/// 1.3 x the measured 0.37, 0.79, 2.00 and 3.82 %.
 INSTANTIATE_TEST_SUITE_P(Issue, NestedSpheres,
-                         testing::Values(Phantom{{1, 1, 1}, 4, 0.006}, Phantom{{1, 1, 2.5}, 4, 0.012},
-                                         Phantom{{1, 1, 1}, 25, 0.03}, Phantom{{1, 1, 2.5}, 25, 0.05},
-                                         Phantom{{2.5, 1, 1}, 4, 0.012}, Phantom{{1, 2.5, 1}, 4, 0.012}));
+                         testing::Values(Phantom{{1, 1, 1}, 4, 0.0048}, Phantom{{1, 1, 2.5}, 4, 0.0103},
+                                         Phantom{{1, 1, 1}, 25, 0.026}, Phantom{{1, 1, 2.5}, 25, 0.0497},
+                                         Phantom{{2.5, 1, 1}, 4, 0.0103}, Phantom{{1, 2.5, 1}, 4, 0.0103}));
 
 /// Rms error on f(r) = (1 - tanh((r - 0.6)/0.25))/2 in an octant of [-1, 1]^3 at t = 0.04, where r < 0.85.
 template <class Scalar, class Smooth>
