@@ -60,18 +60,20 @@ double total_cost(const std::vector<Part>& parts, double isovalues, double voxel
 /// One job from the uploaded file to the finished results.
 class JobRun {
  public:
-  JobRun(const ComputeTask& task, const StageProgress& report)
+  JobRun(const ComputeTask& task, const StageProgress& report, const PipelineLimits& limits)
       : task_(task),
         parts_(parts_of(task)),
+        limits_(limits),
+        surface_bytes_(limits.max_memory_bytes / 4),
         voxels_(static_cast<double>(voxel_count(task.volume.facts.size))),
         clock_(
             total_cost(parts_, static_cast<double>(task.order.isovalues ? task.order.isovalues->size() : 1),
                        voxels_),
             report) {}
 
-  tl::expected<std::vector<Result>, Problem> run(const PipelineLimits& limits) {
+  tl::expected<std::vector<Result>, Problem> run() {
     auto loaded = clock_.run("read", kReadCost * voxels_, [&](const Progress& progress) {
-      return read_nifti(task_.volume_file, read_options(task_.volume.options, limits), progress);
+      return read_nifti(task_.volume_file, read_options(task_.volume.options, limits_), progress);
     });
     if (!loaded) return tl::unexpected(problem_from(loaded.error()));
     description_ = std::move(loaded->description);
@@ -96,8 +98,9 @@ class JobRun {
                [&](const Progress& progress) { original_foliation_ = measure(*original_, progress); });
     clock_.run("surfaces", kMeasureCost * voxels_, [&](const Progress& progress) {
       original_slices_ = middle_slices(*original_, description_.map);
-      isovalues_ =
-          task_.order.isovalues ? *task_.order.isovalues : std::vector{otsu_threshold(*original_, progress)};
+      isovalues_ = task_.order.isovalues
+                       ? *task_.order.isovalues
+                       : std::vector{otsu_threshold(*original_, progress, description_.padding_value)};
     });
     original_surfaces_ = surfaces_of(*original_);
     clock_.run("surfaces", 0, [&](const Progress& progress) {
@@ -113,7 +116,8 @@ class JobRun {
     std::vector<Mesh> surfaces;
     for (const double isovalue : isovalues_) {
       clock_.run("surfaces", kSurfaceCost / 2 * voxels_, [&](const Progress& progress) {
-        surfaces.push_back(extract_isosurface(volume, map, isovalue, {}, progress));
+        surfaces.push_back(
+            extract_isosurface(volume, map, isovalue, {.max_bytes = surface_bytes_}, progress));
       });
     }
     return surfaces;
@@ -234,6 +238,9 @@ class JobRun {
 
   const ComputeTask& task_;
   const std::vector<Part> parts_;
+  const PipelineLimits& limits_;
+  const std::int64_t
+      surface_bytes_;  ///< that one surface may take: its job holds it, the original's and a search tree
   const double voxels_;
   StageClock clock_;
   VolumeDescription description_;
@@ -256,7 +263,15 @@ tl::expected<std::vector<Result>, Problem> run_job(const ComputeTask& task, cons
   lower_thread_priority();
   restart_peak_memory();
   tl::expected<std::vector<Result>, Problem> outcome;
-  with_threads(task.threads, [&] { outcome = JobRun(task, report).run(limits); });
+  try {
+    with_threads(task.threads, [&] { outcome = JobRun(task, report, limits).run(); });
+  } catch (const SurfaceTooLarge& surface) {
+    return tl::unexpected(
+        Problem{"job-too-large",
+                "A surface at one of the isovalues needs more memory than this server lets it take; "
+                "smooth more strongly, choose another isovalue, or crop the volume.",
+                {{"estimate_bytes", surface.needed_bytes}, {"limit_bytes", surface.limit}}});
+  }
   return outcome;
 }
 

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cmath>
 #include <fstream>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <optional>
@@ -46,12 +47,13 @@ test::NiftiFile ball() {
 class RunJob : public testing::Test {
  protected:
   /// As an upload: written and verified.
-  ComputeTask task_for(const test::NiftiFile& input) {
+  ComputeTask task_for(const test::NiftiFile& input, const UploadOptions& options = {}) {
     const test::ByteVector bytes = test::bytes_of(input);
     ComputeTask task;
     task.volume_file = folder_.put("volume", {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
     task.volume.sha256 = "0123";
-    const auto facts = engine_.inspect(task.volume_file, {});
+    task.volume.options = options;
+    const auto facts = engine_.inspect(task.volume_file, options);
     EXPECT_TRUE(facts) << facts.error().detail;
     task.volume.facts = *facts;
     task.output_dir = folder_ / "results";
@@ -211,6 +213,34 @@ TEST_F(RunJob, AVolumeThatIsAllInsideIsItsBox) {
   EXPECT_EQ(surface["euler_characteristic"]["after"], 2);
   EXPECT_NEAR(surface["volume_mm3"]["after"], 32 * 32 * 32, 1e-6 * 32 * 32 * 32);
   EXPECT_EQ(surface["cap_area_mm2"], surface["area_mm2"]["after"]);
+  EXPECT_TRUE(surface["displacement_mm"].is_null()) << "a box of caps has nothing that moved";
+}
+
+TEST_F(RunJob, ASurfaceThatWouldNotFitEndsTheJobWithBothNumbers) {
+  ComputeTask task = task_for(ball());
+  task.parameters = engine_.plan(task.order, task.volume.facts)->parameters;
+  PipelineLimits limits;
+  limits.max_memory_bytes = 100'000;  // the sphere has some 2,000 vertices of 54 bytes
+  const auto results = make_engine(limits).compute(task, [](std::string_view, double) {});
+  ASSERT_FALSE(results);
+  EXPECT_EQ(results.error().slug, "job-too-large");
+  EXPECT_GT(results.error().members.at("estimate_bytes"), results.error().members.at("limit_bytes"));
+}
+
+TEST_F(RunJob, PaddingDoesNotMoveTheAutomaticIsovalue) {
+  test::NiftiFile padded = ball();
+  for (std::size_t voxel = 0; voxel < padded.voxels.size() / 3; ++voxel) {
+    padded.voxels[voxel] = std::numeric_limits<double>::quiet_NaN();
+  }
+  const auto isovalue_with = [&](double replacement) {
+    UploadOptions options;
+    options.non_finite = replacement;
+    ComputeTask task = task_for(padded, options);
+    task.order.isovalues.reset();
+    run(task);
+    return report()["surfaces"][0]["isovalue"].get<double>();
+  };
+  EXPECT_EQ(isovalue_with(-3024), isovalue_with(-30240));
 }
 
 TEST_F(RunJob, ProgressStaysWithinTheWholeAndReachesItsEnd) {
