@@ -56,10 +56,11 @@ class SignedDistance {
         tree_(mesh, std::move(triangles), part_of(report, 0.4, 1)) {}
 
   /// Positive outside. `guess` is a triangle to start from, and becomes the nearest one.
-  double operator()(const Vector3& from, std::uint32_t& guess) const {
+  double operator()(const Float3& from, std::uint32_t& guess) const {
     const NearestPoint nearest = tree_.nearest(from, guess);
     guess = nearest.triangle;
-    return std::copysign(std::sqrt(nearest.squared_distance), dot(from - nearest.point, normal_at(nearest)));
+    return std::copysign(std::sqrt(nearest.squared_distance),
+                         dot(to_double(from) - nearest.point, normal_at(nearest)));
   }
 
  private:
@@ -124,7 +125,7 @@ std::optional<Displacement> displacement(const Mesh& moved, const Mesh& original
         for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k) {
           const std::uint32_t v = order[k];
           if (areas[v] == 0) continue;
-          const double moved_by = distance(to_double(moved.positions[v]), guess);
+          const double moved_by = distance(moved.positions[v], guess);
           part.area += areas[v];
           part.moment += areas[v] * moved_by;
           part.least = std::min(part.least, moved_by);

@@ -13,8 +13,9 @@
 namespace volsmooth {
 namespace {
 
-constexpr std::size_t kLeafSize = 4;
+constexpr std::size_t kLeafSize = 2;
 constexpr std::int64_t kPerChunk = 1 << 14;
+constexpr float kFar = std::numeric_limits<float>::infinity();
 
 void sort_by_place(const Mesh& mesh, std::vector<std::uint32_t>& triangles, const Progress& report) {
   std::vector<Float3> corners;
@@ -59,79 +60,112 @@ NearestPoint nearest_point(const Mesh& mesh, std::uint32_t triangle, const Vecto
   return found(a + (part_b / sum) * ab + (part_c / sum) * ac, 1 | 2 | 4);
 }
 
-double TriangleTree::Box::squared_distance(const Vector3& from) const {
-  double sum = 0;
+std::array<float, 4> TriangleTree::Node::squared_distances(const Float3& from) const {
+  // GCC's vectors, since it makes branches of the same text for an array.
+  using Four = float __attribute__((vector_size(16)));
+  Four sum{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const double beyond = std::max({low[axis] - from[axis], from[axis] - high[axis], 0.0});
+    const Four below = std::bit_cast<Four>(low[axis]) - from[axis];
+    const Four above = from[axis] - std::bit_cast<Four>(high[axis]);
+    const Four larger = below > above ? below : above, beyond = larger > 0 ? larger : Four{};
     sum += beyond * beyond;
   }
-  return sum;
+  return std::bit_cast<std::array<float, 4>>(sum);
+}
+
+void TriangleTree::Node::set(std::size_t child, const Float3& box_low, const Float3& box_high) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    low[axis][child] = box_low[axis];
+    high[axis][child] = box_high[axis];
+  }
 }
 
 TriangleTree::TriangleTree(const Mesh& mesh, std::vector<std::uint32_t> chosen, const Progress& report)
-    : mesh_(mesh),
-      triangles_(std::move(chosen)),
-      leaves_(std::bit_ceil((triangles_.size() + kLeafSize - 1) / kLeafSize)),
-      boxes_(2 * leaves_) {
+    : mesh_(mesh), triangles_(std::move(chosen)) {
   sort_by_place(mesh_, triangles_, part_of(report, 0, 0.8));
-  parallel_for(
-      static_cast<std::int64_t>(leaves_), kPerChunk,
-      [&](std::int64_t begin, std::int64_t end) {
-        for (auto leaf = static_cast<std::size_t>(begin); leaf < static_cast<std::size_t>(end); ++leaf) {
-          boxes_[leaves_ + leaf] = box_of_leaf(leaf);
-        }
-      },
-      part_of(report, 0.8, 1));
-  for (std::size_t node = leaves_ - 1; node > 0; --node) {
-    const Box &left = boxes_[2 * node], &right = boxes_[2 * node + 1];
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      boxes_[node].low[axis] = std::min(left.low[axis], right.low[axis]);
-      boxes_[node].high[axis] = std::max(left.high[axis], right.high[axis]);
-    }
+  const auto add_level = [this](std::size_t children, const auto& node, const Progress& progress) {
+    std::vector<Node> level((children + 3) / 4);
+    parallel_for(
+        std::ssize(level), kPerChunk,
+        [&](std::int64_t begin, std::int64_t end) {
+          for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k) {
+            level[k] = node(k);
+          }
+        },
+        progress);
+    levels_.push_back(std::move(level));
+  };
+  add_level((triangles_.size() + kLeafSize - 1) / kLeafSize,
+            [this](std::size_t place) { return node_of_leaves(place); }, part_of(report, 0.8, 0.95));
+  while (levels_.back().size() > 1) {
+    add_level(
+        levels_.back().size(), [this](std::size_t place) { return node_of_nodes(levels_.back(), place); },
+        no_progress);
   }
 }
 
-/// Leaves beyond the last triangle are infinitely far from everything.
-TriangleTree::Box TriangleTree::box_of_leaf(std::size_t leaf) const {
-  constexpr float kFar = std::numeric_limits<float>::infinity();
-  Box box{{kFar, kFar, kFar}, {-kFar, -kFar, -kFar}};
-  const std::size_t end = std::min(triangles_.size(), (leaf + 1) * kLeafSize);
-  for (std::size_t t = leaf * kLeafSize; t < end; ++t) {
-    for (std::uint32_t vertex : mesh_.triangles[triangles_[t]]) {
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        box.low[axis] = std::min(box.low[axis], mesh_.positions[vertex][axis]);
-        box.high[axis] = std::max(box.high[axis], mesh_.positions[vertex][axis]);
+TriangleTree::Node TriangleTree::node_of_leaves(std::size_t place) const {
+  Node node;
+  for (std::size_t child = 0; child < 4; ++child) {
+    Float3 low{kFar, kFar, kFar}, high{-kFar, -kFar, -kFar};
+    const std::size_t leaf = 4 * place + child, end = std::min(triangles_.size(), (leaf + 1) * kLeafSize);
+    for (std::size_t t = leaf * kLeafSize; t < end; ++t) {
+      for (std::uint32_t vertex : mesh_.triangles[triangles_[t]]) {
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          low[axis] = std::min(low[axis], mesh_.positions[vertex][axis]);
+          high[axis] = std::max(high[axis], mesh_.positions[vertex][axis]);
+        }
       }
     }
+    node.set(child, low, high);
   }
-  return box;
+  return node;
 }
 
-NearestPoint TriangleTree::nearest(const Vector3& from, std::uint32_t guess) const {
+TriangleTree::Node TriangleTree::node_of_nodes(std::span<const Node> below, std::size_t place) {
+  Node node;
+  for (std::size_t child = 0; child < 4; ++child) {
+    Float3 low{kFar, kFar, kFar}, high{-kFar, -kFar, -kFar};
+    for (std::size_t axis = 0; axis < 3 && 4 * place + child < below.size(); ++axis) {
+      low[axis] = std::ranges::min(below[4 * place + child].low[axis]);
+      high[axis] = std::ranges::max(below[4 * place + child].high[axis]);
+    }
+    node.set(child, low, high);
+  }
+  return node;
+}
+
+NearestPoint TriangleTree::nearest(const Float3& from, std::uint32_t guess) const {
+  // Six roundings to float make a box's distance too large by less than this.
+  constexpr double kNoMore = 1 - 0x1p-20;
   struct Waiting {
-    std::size_t node;
-    double squared_distance;
+    std::size_t level, place;  // level 0: a leaf
+    float squared_distance;
   };
-  std::array<Waiting, 64> stack;  // at most one node a level waits
+  std::array<Waiting, 64> stack;  // three of a level at most, of at most 16 levels, and the last four
   std::size_t waiting = 0;
-  NearestPoint best = nearest_point(mesh_, guess, from);
-  stack[waiting++] = {1, boxes_[1].squared_distance(from)};
+  const Vector3 exactly_from = to_double(from);
+  NearestPoint best = nearest_point(mesh_, guess, exactly_from);
+  stack[waiting++] = {levels_.size(), 0, 0};
   while (waiting > 0) {
-    const auto [node, squared_distance] = stack[--waiting];
-    if (squared_distance >= best.squared_distance) continue;
-    if (node < leaves_) {
-      Waiting near{2 * node, boxes_[2 * node].squared_distance(from)};
-      Waiting far{2 * node + 1, boxes_[2 * node + 1].squared_distance(from)};
-      if (far.squared_distance < near.squared_distance) std::swap(near, far);
-      stack[waiting++] = far;
-      stack[waiting++] = near;
+    const auto [level, place, squared_distance] = stack[--waiting];
+    if (kNoMore * double{squared_distance} >= best.squared_distance) continue;
+    if (level == 0) {
+      const std::size_t end = std::min(triangles_.size(), (place + 1) * kLeafSize);
+      for (std::size_t t = place * kLeafSize; t < end; ++t) {
+        const NearestPoint found = nearest_point(mesh_, triangles_[t], exactly_from);
+        if (found.squared_distance < best.squared_distance) best = found;
+      }
       continue;
     }
-    const std::size_t leaf = node - leaves_;
-    const std::size_t end = std::min(triangles_.size(), (leaf + 1) * kLeafSize);
-    for (std::size_t t = leaf * kLeafSize; t < end; ++t) {
-      const NearestPoint found = nearest_point(mesh_, triangles_[t], from);
-      if (found.squared_distance < best.squared_distance) best = found;
+    const auto distances = levels_[level - 1][place].squared_distances(from);
+    const std::size_t first = waiting;
+    for (std::size_t child = 0; child < 4; ++child) {
+      if (kNoMore * double{distances[child]} >= best.squared_distance) continue;
+      // The nearest child comes last, to be looked at first.
+      std::size_t at = waiting++;
+      for (; at > first && stack[at - 1].squared_distance < distances[child]; --at) stack[at] = stack[at - 1];
+      stack[at] = {level - 1, 4 * place + child, distances[child]};
     }
   }
   return best;

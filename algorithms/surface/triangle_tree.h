@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "algorithms/progress.h"
@@ -21,27 +22,30 @@ struct NearestPoint {
 /// The point of `triangle` nearest to `from` (Ericson, Real-Time Collision Detection, 5.1.5).
 NearestPoint nearest_point(const Mesh& mesh, std::uint32_t triangle, const Vector3& from);
 
-/// Bounding boxes of triangles in a complete binary tree: triangles in Morton order, a few to a leaf, the
-/// nodes in the order of a heap.
+/// Bounding boxes of triangles in a tree of four children a node: triangles in Morton order, a few to a leaf.
+/// Exact for positions below 1e18 mm.
 class TriangleTree {
  public:
   /// Of the triangles `chosen` of `mesh`, which must outlive the tree; at least one.
   TriangleTree(const Mesh& mesh, std::vector<std::uint32_t> chosen, const Progress& report = no_progress);
 
   /// The nearest point of all triangles. `guess` is any triangle of the tree, the faster the nearer it lies.
-  NearestPoint nearest(const Vector3& from, std::uint32_t guess) const;
+  NearestPoint nearest(const Float3& from, std::uint32_t guess) const;
 
  private:
-  struct Box {
-    Float3 low, high;
-    double squared_distance(const Vector3& from) const;
+  /// The boxes of four children, axis by axis, so that the processor takes them at once. Those of children
+  /// that do not exist are infinitely far from everything.
+  struct Node {
+    std::array<std::array<float, 4>, 3> low, high;
+    std::array<float, 4> squared_distances(const Float3& from) const;
+    void set(std::size_t child, const Float3& box_low, const Float3& box_high);
   };
-  Box box_of_leaf(std::size_t leaf) const;
+  Node node_of_leaves(std::size_t place) const;
+  static Node node_of_nodes(std::span<const Node> below, std::size_t place);
 
   const Mesh& mesh_;
   std::vector<std::uint32_t> triangles_;
-  std::size_t leaves_;      // a power of two
-  std::vector<Box> boxes_;  // node n has the children 2 n and 2 n + 1; the root is 1
+  std::vector<std::vector<Node>> levels_;  // the lowest one over leaves, the last one is the root
 };
 
 }  // namespace volsmooth

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <random>
 
+#include "algorithms/surface/vector_math.h"
 #include "tests/support/world_phantoms.h"
 
 namespace volsmooth {
@@ -30,9 +31,9 @@ Mesh scattered_triangles(unsigned count, unsigned seed) {
   return mesh;
 }
 
-Vector3 random_point(std::mt19937& random) {
-  Vector3 point;
-  for (double& x : point) x = 3 * static_cast<double>(random()) / 4294967296.0 - 1;
+Float3 random_point(std::mt19937& random) {
+  Float3 point;
+  for (float& x : point) x = 3 * static_cast<float>(random() >> 8) * 0x1p-24F - 1;
   return point;
 }
 
@@ -41,7 +42,7 @@ TEST(NearestPointOfATriangle, IsNoFartherThanAnyPointOfIt) {
   std::mt19937 random(2);
   constexpr int kSteps = 40;
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
-    const Vector3 from = random_point(random);
+    const Vector3 from = to_double(random_point(random));
     const NearestPoint nearest = nearest_point(mesh, t, from);
     double sampled = std::numeric_limits<double>::infinity(), longest = 0;
     for (int i = 0; i <= kSteps; ++i) {
@@ -73,9 +74,10 @@ TEST(TriangleTree, FindsWhatASearchOfAllTrianglesFinds) {
     const TriangleTree tree(mesh, all);
     std::mt19937 random(count);
     for (int k = 0; k < 200; ++k) {
-      const Vector3 from = random_point(random);
+      const Float3 from = random_point(random);
       double least = std::numeric_limits<double>::infinity();
-      for (std::uint32_t t : all) least = std::min(least, nearest_point(mesh, t, from).squared_distance);
+      for (std::uint32_t t : all)
+        least = std::min(least, nearest_point(mesh, t, to_double(from)).squared_distance);
       EXPECT_EQ(tree.nearest(from, static_cast<std::uint32_t>(random() % count)).squared_distance, least);
     }
   }
