@@ -1,6 +1,7 @@
 // The composition root: the only file that knows everyone.
 
 #include <signal.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -163,5 +164,6 @@ int run(int argc, char** argv) {
 }  // namespace volsmooth
 
 int main(int argc, char** argv) {
+  ::umask(077);  // patient data is its owner's, also in a folder that was there before
   return volsmooth::run(argc, argv);
 }
