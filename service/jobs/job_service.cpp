@@ -9,9 +9,6 @@
 namespace volsmooth {
 namespace {
 
-/// Kept free on the disk for the database and the results of accepted jobs.
-constexpr std::int64_t kReservedDiskBytes = std::int64_t{64} << 20;
-
 std::optional<std::int64_t> sequence_from(std::string_view cursor) {
   std::int64_t sequence = 0;
   const auto [end, error] = std::from_chars(cursor.data(), cursor.data() + cursor.size(), sequence);
@@ -50,12 +47,10 @@ const Engine& JobService::engine() const {
 
 tl::expected<IncomingFile, Problem> JobService::begin_upload(std::optional<std::int64_t> declared_bytes) {
   const std::int64_t bytes = declared_bytes.value_or(0);
-  const std::int64_t free = state_->files.free_bytes() - kReservedDiskBytes;
   if (bytes > state_->settings.max_upload_bytes) return too_large(state_->settings.max_upload_bytes);
-  if (bytes > free)
-    return refuse("insufficient-storage", "The disk has too little free space for this upload.",
-                  {{"free_bytes", std::max<std::int64_t>(free, 0)}});
-  return state_->files.receive();
+  if (auto file = state_->files.receive(bytes)) return *std::move(file);
+  return refuse("insufficient-storage", "The disk has too little free space for this upload.",
+                {{"free_bytes", std::max<std::int64_t>(state_->files.available_bytes(), 0)}});
 }
 
 tl::expected<StoredVolume, Problem> JobService::keep_volume(IncomingFile file, const UploadOptions& options) {

@@ -21,6 +21,8 @@ struct JobServiceSettings {
   int threads = 0;                      ///< compute threads of a job; 0: all cores
   std::int64_t memory_limit_bytes = 0;  ///< running jobs together; 0: 80 % of the machine's
   std::int64_t max_upload_bytes = std::int64_t{16} << 30;
+  /// Uploads leave this much of the disk free, for the database and the results of accepted jobs.
+  std::int64_t reserved_disk_bytes = std::int64_t{64} << 20;
   int max_deaths = 10;  ///< a job that was running at this many deaths of the daemon is failed
   int max_queued = 10'000;
 };

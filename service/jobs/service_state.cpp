@@ -37,7 +37,7 @@ tl::unexpected<Problem> refuse(std::string slug, std::string detail, nlohmann::j
 JobService::State::State(JobServiceSettings given, Engine computing)
     : settings(completed(std::move(given))),
       engine(std::move(computing)),
-      files(settings.data_dir),
+      files(settings.data_dir, settings.reserved_disk_bytes),
       database(files.path_of("volsmooth.db")),
       volumes(database),
       jobs(database),

@@ -32,6 +32,13 @@ void refuse_network_file_system(const fs::path& root) {
     throw std::runtime_error("the data directory lies on a network file system; it must be on a local disk");
 }
 
+std::int64_t free_bytes_at(const fs::path& root) {
+  struct statvfs found {};
+  if (::statvfs(root.c_str(), &found) != 0)
+    throw std::system_error(errno, std::generic_category(), "statvfs");
+  return static_cast<std::int64_t>(found.f_bavail) * static_cast<std::int64_t>(found.f_frsize);
+}
+
 FileDescriptor lock(const fs::path& root) {
   FileDescriptor file = open_file(root / "lock", O_RDWR | O_CREAT);
   if (::flock(file.get(), LOCK_EX | LOCK_NB) != 0)
@@ -56,7 +63,9 @@ fs::path part_of(fs::path name) {
 
 }  // namespace
 
-FileStore::FileStore(fs::path root) : root_(std::move(root)) {
+FileStore::FileStore(fs::path root, std::int64_t reserved_bytes)
+    : root_(std::move(root)),
+      disk_(std::make_shared<DiskSpace>([where = root_] { return free_bytes_at(where); }, reserved_bytes)) {
   if (fs::create_directories(root_)) fs::permissions(root_, fs::perms::owner_all);
   refuse_network_file_system(root_);
   lock_ = lock(root_);
@@ -64,16 +73,15 @@ FileStore::FileStore(fs::path root) : root_(std::move(root)) {
 }
 
 std::int64_t FileStore::free_bytes() const {
-  struct statvfs found {};
-  if (::statvfs(root_.c_str(), &found) != 0)
-    throw std::system_error(errno, std::generic_category(), "statvfs");
-  return static_cast<std::int64_t>(found.f_bavail) * static_cast<std::int64_t>(found.f_frsize);
+  return free_bytes_at(root_);
 }
 
-IncomingFile FileStore::receive() {
+std::optional<IncomingFile> FileStore::receive(std::int64_t expected_bytes) {
   static std::atomic<std::uint64_t> count =
       0;  // the folder is swept at the start, so a number is unique enough
-  return IncomingFile(root_ / kTemporary / std::to_string(++count));
+  IncomingFile file(root_ / kTemporary / std::to_string(++count), disk_);
+  if (!file.expect(expected_bytes)) return std::nullopt;
+  return file;
 }
 
 void FileStore::adopt(IncomingFile file, const fs::path& name) {

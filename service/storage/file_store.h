@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
+#include <optional>
 #include <string_view>
 
 #include "service/storage/incoming_file.h"
@@ -17,13 +19,18 @@ class FileStore {
  public:
   /// Creates and locks the directory. Throws std::runtime_error when another process holds it or when it lies
   /// on a network file system, where neither locks nor fsync can be relied on.
-  explicit FileStore(std::filesystem::path root);
+  /// What it receives leaves `reserved_bytes` of the disk free.
+  explicit FileStore(std::filesystem::path root, std::int64_t reserved_bytes = 0);
 
   std::filesystem::path path_of(const std::filesystem::path& name) const { return root_ / name; }
   std::int64_t free_bytes() const;
 
-  /// A new file in the area for unfinished ones.
-  IncomingFile receive();
+  /// What can still be received.
+  std::int64_t available_bytes() const { return disk_->available_bytes(); }
+
+  /// A new file in the area for unfinished ones; nothing when the disk has no such room beside what others
+  /// were promised.
+  std::optional<IncomingFile> receive(std::int64_t expected_bytes = 0);
   /// Makes a received file a stored one: fsync, rename, fsync of the directory.
   void adopt(IncomingFile file, const std::filesystem::path& name);
 
@@ -41,6 +48,7 @@ class FileStore {
 
  private:
   std::filesystem::path root_;
+  std::shared_ptr<DiskSpace> disk_;
   FileDescriptor lock_;
 };
 

@@ -7,18 +7,23 @@
 #include <span>
 #include <string>
 
+#include "service/storage/disk_space.h"
+
 namespace volsmooth {
 
 /// A file that is being received: written front to back, hashed on the way, gone when dropped unless it was
 /// adopted by the FileStore. Movable; used by one thread at a time. Its calls block on the disk.
 class IncomingFile {
  public:
-  explicit IncomingFile(std::filesystem::path path);  ///< creates it; throws std::system_error
+  /// Creates it; throws std::system_error. With a disk it has its room promised as it grows.
+  explicit IncomingFile(std::filesystem::path path, std::shared_ptr<DiskSpace> disk = nullptr);
   IncomingFile(IncomingFile&&) noexcept;
   IncomingFile& operator=(IncomingFile&&) noexcept;
   ~IncomingFile();
 
-  void write(std::span<const std::byte> bytes);  ///< throws std::system_error, such as ENOSPC
+  /// Has room for so many bytes more promised; false: the disk has not.
+  bool expect(std::int64_t bytes);
+  void write(std::span<const std::byte> bytes);  ///< throws std::system_error; ENOSPC before the disk is full
   std::int64_t bytes() const;
   const std::filesystem::path& path() const;
 

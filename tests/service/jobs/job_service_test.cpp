@@ -324,6 +324,26 @@ TEST_F(JobServiceTest, UploadsHaveALimit) {
   EXPECT_EQ(slug_of(upload(service, "1234")), "none");
 }
 
+TEST_F(JobServiceTest, UploadsAtTheSameTimeShareTheDisk) {
+  JobServiceSettings large = settings();
+  large.max_upload_bytes = std::numeric_limits<std::int64_t>::max();
+  JobService service(large, fake_.engine());
+  const std::int64_t most = service.statistics().free_disk_bytes / 10 * 6;
+  {
+    const auto first = service.begin_upload(most);
+    EXPECT_EQ(slug_of(first), "none");
+    EXPECT_EQ(slug_of(service.begin_upload(most)), "insufficient-storage");
+  }
+  EXPECT_EQ(slug_of(service.begin_upload(most)), "none");
+}
+
+TEST_F(JobServiceTest, AnUploadOfUnknownLengthLeavesTheReserve) {
+  JobServiceSettings full = settings();
+  full.reserved_disk_bytes = std::int64_t{1} << 60;
+  JobService service(full, fake_.engine());
+  EXPECT_EQ(slug_of(service.begin_upload({})), "insufficient-storage");
+}
+
 TEST_F(JobServiceTest, AnUploadLargerThanTheDiskIsRefused) {
   JobServiceSettings large = settings();
   large.max_upload_bytes = std::numeric_limits<std::int64_t>::max();

@@ -29,7 +29,7 @@ std::set<std::string> names_in(const fs::path& directory) {
 }
 
 IncomingFile received(FileStore& store, const std::string& text) {
-  IncomingFile file = store.receive();
+  IncomingFile file = store.receive().value();
   file.write(std::as_bytes(std::span(text)));
   return file;
 }

@@ -85,5 +85,50 @@ TEST(IncomingFile, FinishesOnce) {
   EXPECT_EQ(file.finish(), file.finish());
 }
 
+// 10 MiB are free beyond the reserve, and stay so in the eyes of the disk.
+class IncomingFileOnADisk : public testing::Test {
+ protected:
+  static constexpr std::int64_t kMiB = std::int64_t{1} << 20;
+  static constexpr std::int64_t kRoom = 10 * kMiB, kReserve = 64 * kMiB;
+
+  IncomingFile file(const std::string& name) { return IncomingFile(scratch_.path() / name, disk_); }
+
+  ScratchFolder scratch_;
+  std::int64_t free_ = kRoom + kReserve;
+  std::shared_ptr<DiskSpace> disk_ = std::make_shared<DiskSpace>([this] { return free_; }, kReserve);
+};
+
+TEST_F(IncomingFileOnADisk, WithoutADeclaredLengthLeavesTheReserve) {
+  const std::string piece(kMiB, 'x');
+  IncomingFile endless = file("a");
+  std::int64_t taken = 0;
+  try {
+    for (; taken <= kRoom; taken += kMiB, free_ -= kMiB) write_text(endless, piece);
+    FAIL() << "the reserve was touched";
+  } catch (const std::system_error& error) {
+    EXPECT_EQ(error.code(), std::errc::no_space_on_device);
+  }
+  EXPECT_GT(taken, 0);
+  EXPECT_GE(free_, kReserve);
+}
+
+TEST_F(IncomingFileOnADisk, IsNotInTheWayOfWhatAnotherWasPromised) {
+  IncomingFile declared = file("a"), other = file("b");
+  ASSERT_TRUE(declared.expect(8 * kMiB));
+  EXPECT_FALSE(other.expect(3 * kMiB));
+  EXPECT_THROW(write_text(other, "x"), std::system_error);
+  EXPECT_NO_THROW(write_text(declared, std::string(8 * kMiB, 'x')));
+}
+
+TEST_F(IncomingFileOnADisk, GivesBackWhatItWasPromised) {
+  {
+    IncomingFile dropped = file("a");
+    ASSERT_TRUE(dropped.expect(kRoom));
+    write_text(dropped, "some of it");
+    EXPECT_EQ(disk_->available_bytes(), 10);
+  }
+  EXPECT_EQ(disk_->available_bytes(), kRoom);
+}
+
 }  // namespace
 }  // namespace volsmooth

@@ -1,0 +1,22 @@
+#include "service/storage/disk_space.h"
+
+namespace volsmooth {
+
+std::int64_t DiskSpace::available_bytes() const {
+  const std::lock_guard lock(mutex_);
+  return free_bytes_() - reserved_bytes_ - promised_bytes_;
+}
+
+bool DiskSpace::promise(std::int64_t bytes) {
+  const std::lock_guard lock(mutex_);
+  if (bytes > free_bytes_() - reserved_bytes_ - promised_bytes_) return false;
+  promised_bytes_ += bytes;
+  return true;
+}
+
+void DiskSpace::end_promise(std::int64_t bytes) {
+  const std::lock_guard lock(mutex_);
+  promised_bytes_ -= bytes;
+}
+
+}  // namespace volsmooth

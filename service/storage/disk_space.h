@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <mutex>
+
+namespace volsmooth {
+
+/// The free space of a disk, promised to files before they are written, so that together they leave a
+/// reserve. Thread-safe.
+class DiskSpace {
+ public:
+  /// `free_bytes` measures what is free on the disk.
+  DiskSpace(std::function<std::int64_t()> free_bytes, std::int64_t reserved_bytes)
+      : free_bytes_(std::move(free_bytes)), reserved_bytes_(reserved_bytes) {}
+
+  std::int64_t available_bytes() const;  ///< beyond the reserve and all promises; negative: they are touched
+  bool promise(std::int64_t bytes);      ///< false: not that much is available
+  void end_promise(std::int64_t bytes);  ///< of what was written, or never will be
+
+ private:
+  const std::function<std::int64_t()> free_bytes_;
+  const std::int64_t reserved_bytes_;
+  mutable std::mutex mutex_;
+  std::int64_t promised_bytes_ = 0;  // guarded by the mutex
+};
+
+}  // namespace volsmooth
