@@ -1,8 +1,10 @@
 #include "service/http/log.h"
 
+#include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include <memory>
 #include <nlohmann/json.hpp>
 
 namespace volsmooth {
@@ -13,11 +15,26 @@ std::string quoted(std::string_view text) {
   return nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
+/// The members of a line. What does not come as members already, such as a plain message of a library or of
+/// the jobs, is made a `message`.
+class Members : public spdlog::custom_flag_formatter {
+ public:
+  void format(const spdlog::details::log_msg& line, const std::tm&, spdlog::memory_buf_t& into) override {
+    const std::string_view payload(line.payload.data(), line.payload.size());
+    const std::string members =
+        payload.starts_with('"') ? std::string(payload) : R"("event":"message","message":)" + quoted(payload);
+    into.append(members.data(), members.data() + members.size());
+  }
+  std::unique_ptr<custom_flag_formatter> clone() const override { return std::make_unique<Members>(); }
+};
+
 }  // namespace
 
 void start_log(const std::string& level) {
   auto logger = spdlog::stderr_logger_mt("volsmoothd");
-  logger->set_pattern(R"({"time":"%Y-%m-%dT%H:%M:%S.%eZ","level":"%l",%v})", spdlog::pattern_time_type::utc);
+  auto formatter = std::make_unique<spdlog::pattern_formatter>(spdlog::pattern_time_type::utc);
+  formatter->add_flag<Members>('*').set_pattern(R"({"time":"%Y-%m-%dT%H:%M:%S.%eZ","level":"%l",%*})");
+  logger->set_formatter(std::move(formatter));
   logger->set_level(spdlog::level::from_str(level));
   logger->flush_on(spdlog::level::info);
   spdlog::set_default_logger(std::move(logger));
