@@ -18,4 +18,4 @@ ctest --test-dir build --output-on-failure --no-tests=error || die "tests failed
 build build-sanitize -DVOLSMOOTH_TESTS=ON -DVOLSMOOTH_SANITIZE=address,undefined \
   -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG=-O1 -- unit_tests
 say "running the unit tests under the sanitizers"
-ctest --test-dir build-sanitize --output-on-failure --no-tests=error -L unit -j "$(nproc)" || die "tests failed under the sanitizers; each failure is printed above"
+LSAN_OPTIONS=suppressions=$PWD/tests/leaks.supp ctest --test-dir build-sanitize --output-on-failure --no-tests=error -L unit -j "$(nproc)" || die "tests failed under the sanitizers; each failure is printed above"
