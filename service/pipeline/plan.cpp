@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "algorithms/catalog.h"
 #include "algorithms/formats/mesh_writers.h"
+#include "service/pipeline/parts.h"
 #include "service/pipeline/stages.h"
 
 namespace volsmooth {
@@ -17,31 +17,6 @@ constexpr double kBytesPerVoxelOfVolume = sizeof(float);
 constexpr double kBytesPerVoxelOfSurface = 11;
 
 constexpr std::int64_t kFixedBytes = std::int64_t{64} << 20;
-
-const Method& method_called(const std::string& name) {
-  const Method* method = find_method(name);
-  if (method == nullptr) throw std::logic_error("order for a method that is not in the catalogue");
-  return *method;
-}
-
-double extra_bytes_per_voxel(const Method& method) {
-  double bytes = method.extra_bytes_per_voxel;
-  for (const std::string& part : method.info.parts)
-    bytes = std::max(bytes, extra_bytes_per_voxel(method_called(part)));
-  return bytes;
-}
-
-double number(const ParameterValues& parameters, const std::string& name) {
-  const auto found = parameters.find(name);
-  return found == parameters.end() ? 0 : std::get<double>(found->second);
-}
-
-double steps_of(const Method& method, const ParameterValues& asked, const Grid& grid) {
-  if (method.info.parts.empty()) return number(method.resolve(asked, grid), "steps");
-  double steps = 0;
-  for (const std::string& part : method.info.parts) steps += steps_of(method_called(part), asked, grid);
-  return steps;
-}
 
 tl::expected<void, Problem> check_isovalues(const JobOrder& order, const VolumeFacts& volume) {
   if (!order.isovalues) return {};
@@ -64,13 +39,18 @@ tl::expected<JobPlan, Problem> plan_job(const JobOrder& order, const VolumeFacts
                                         const PipelineLimits& limits) {
   if (const auto checked = check_isovalues(order, volume); !checked) return tl::unexpected(checked.error());
 
-  const Method& method = method_called(order.method);
   const Grid grid{volume.size, volume.spacing_mm};
   const auto voxels = static_cast<double>(voxel_count(grid.size));
   JobPlan plan;
-  plan.parameters = method.resolve(order.parameters, grid);
+  plan.parameters = method_called(order.method).resolve(order.parameters, grid);
 
-  const double voxel_steps = voxels * steps_of(method, order.parameters, grid);
+  double steps = 0, extra_bytes_per_voxel = 0;
+  const std::vector<Part> parts = parts_of(order, plan.parameters, grid);
+  for (const Part& part : parts) {
+    steps += steps_of(part);
+    extra_bytes_per_voxel = std::max(extra_bytes_per_voxel, part.method->extra_bytes_per_voxel);
+  }
+  const double voxel_steps = voxels * steps;
   if (voxel_steps > limits.max_voxel_steps) {
     return tl::unexpected(
         Problem{"job-too-expensive",
@@ -79,10 +59,10 @@ tl::expected<JobPlan, Problem> plan_job(const JobOrder& order, const VolumeFacts
                 {{"estimate_voxel_steps", voxel_steps}, {"limit_voxel_steps", limits.max_voxel_steps}}});
   }
 
-  const double volumes_held = method.info.parts.size() > 1 ? 2 : 1;
+  const double volumes_held = parts.size() > 1 ? 2 : 1;
   const double surfaces = order.isovalues ? static_cast<double>(order.isovalues->size()) : 1;
-  const double bytes_per_voxel = kBytesPerVoxelOfVolume * volumes_held + extra_bytes_per_voxel(method) +
-                                 kBytesPerVoxelOfSurface * surfaces;
+  const double bytes_per_voxel =
+      kBytesPerVoxelOfVolume * volumes_held + extra_bytes_per_voxel + kBytesPerVoxelOfSurface * surfaces;
   plan.memory_bytes = kFixedBytes + static_cast<std::int64_t>(std::ceil(voxels * bytes_per_voxel));
   if (limits.max_memory_bytes > 0 && plan.memory_bytes > limits.max_memory_bytes) {
     return tl::unexpected(

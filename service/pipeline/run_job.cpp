@@ -3,12 +3,12 @@
 #include <system_error>
 #include <utility>
 
-#include "algorithms/catalog.h"
 #include "algorithms/formats/mesh_writers.h"
 #include "algorithms/formats/picture.h"
 #include "algorithms/surface/isosurface.h"
 #include "algorithms/surface/otsu.h"
 #include "algorithms/volume/parallel.h"
+#include "service/pipeline/parts.h"
 #include "service/pipeline/reading.h"
 #include "service/pipeline/report.h"
 #include "service/pipeline/stage_clock.h"
@@ -22,31 +22,6 @@ constexpr double kReadCost = 12e-9, kStepCost = 1.2e-9, kMeasureCost = 1e-9, kSu
                  kWriteCost = 15e-9, kMeshWriteCost = 5e-9;
 
 const char* const kOriginal = "original";
-
-/// The methods that an order runs side by side, each with its own resolved parameters.
-struct Part {
-  const Method* method;
-  ParameterValues parameters;
-};
-
-std::vector<Part> parts_of(const ComputeTask& task) {
-  const Grid grid{task.volume.facts.size, task.volume.facts.spacing_mm};
-  const Method* whole = find_method(task.order.method);
-  if (whole == nullptr) throw std::logic_error("order for a method that is not in the catalogue");
-  if (whole->info.parts.empty()) return {{whole, task.parameters}};
-  std::vector<Part> parts;
-  for (const std::string& name : whole->info.parts) {
-    const Method* method = find_method(name);
-    if (method == nullptr) throw std::logic_error("the catalogue names a part that is not in it");
-    parts.push_back({method, method->resolve(task.order.parameters, grid)});
-  }
-  return parts;
-}
-
-double steps_of(const Part& part) {
-  const auto steps = part.parameters.find("steps");
-  return steps == part.parameters.end() ? 1 : std::get<double>(steps->second);
-}
 
 double total_cost(const std::vector<Part>& parts, double isovalues, double voxels) {
   double cost = kReadCost + 2 * kMeasureCost + isovalues * kSurfaceCost / 2;
@@ -62,7 +37,7 @@ class JobRun {
  public:
   JobRun(const ComputeTask& task, const StageProgress& report, const PipelineLimits& limits)
       : task_(task),
-        parts_(parts_of(task)),
+        parts_(parts_of(task.order, task.parameters, {task.volume.facts.size, task.volume.facts.spacing_mm})),
         limits_(limits),
         surface_bytes_(limits.max_memory_bytes / 4),
         voxels_(static_cast<double>(voxel_count(task.volume.facts.size))),

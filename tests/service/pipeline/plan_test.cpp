@@ -94,12 +94,13 @@ TEST(Plan, AJobThatNeedsTooMuchMemoryIsRefusedWithBothNumbers) {
 }
 
 TEST(Plan, CompareCostsItsPartsTogether) {
-  // The limit lies between one flow and both.
   PipelineLimits limits;
   const auto flow = plan_job(order("mean-curvature-flow", 25), head(), limits);
-  ASSERT_TRUE(flow);
-  limits.max_voxel_steps = number(*flow, "steps") * 256.0 * 256.0 * 256.0;
-  EXPECT_TRUE(plan_job(order("mean-curvature-flow", 25), head(), limits));
+  const auto laplacian = plan_job(order("laplacian", 25), head(), limits);
+  ASSERT_TRUE(flow && laplacian);
+  limits.max_voxel_steps = (number(*flow, "steps") + number(*laplacian, "steps")) * 256.0 * 256.0 * 256.0;
+  EXPECT_TRUE(plan_job(order("compare", 25), head(), limits));
+  limits.max_voxel_steps -= 1;
   EXPECT_FALSE(plan_job(order("compare", 25), head(), limits));
 }
 

@@ -1,0 +1,29 @@
+#include "service/pipeline/parts.h"
+
+#include <stdexcept>
+
+namespace volsmooth {
+
+const Method& method_called(const std::string& name) {
+  const Method* method = find_method(name);
+  if (method == nullptr) throw std::logic_error("a method that is not in the catalogue");
+  return *method;
+}
+
+std::vector<Part> parts_of(const JobOrder& order, const ParameterValues& resolved, const Grid& grid) {
+  const Method& whole = method_called(order.method);
+  if (whole.info.parts.empty()) return {{&whole, resolved}};
+  std::vector<Part> parts;
+  for (const std::string& name : whole.info.parts) {
+    const Method& method = method_called(name);
+    parts.push_back({&method, method.resolve(order.parameters, grid)});
+  }
+  return parts;
+}
+
+double steps_of(const Part& part) {
+  const auto steps = part.parameters.find("steps");
+  return steps == part.parameters.end() ? 1 : std::get<double>(steps->second);
+}
+
+}  // namespace volsmooth

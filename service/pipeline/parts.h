@@ -1,0 +1,25 @@
+#pragma once
+
+#include <vector>
+
+#include "algorithms/catalog.h"
+#include "service/jobs/job.h"
+
+namespace volsmooth {
+
+/// One of the methods that an order runs side by side, with the parameters that its `run` takes.
+struct Part {
+  const Method* method;
+  ParameterValues parameters;
+};
+
+/// The row of the catalogue called `name`. Throws std::logic_error: an order was checked long before.
+const Method& method_called(const std::string& name);
+
+/// The methods behind `order`, which resolve to `resolved` as a whole: the one that it names, or its parts.
+std::vector<Part> parts_of(const JobOrder& order, const ParameterValues& resolved, const Grid& grid);
+
+/// Passes over the volume: 1 for a method that does not count its steps.
+double steps_of(const Part& part);
+
+}  // namespace volsmooth
