@@ -22,7 +22,7 @@ using UpwindCells = std::array<Scalar, 7>;
 
 /// The number that keeps the weights' denominators from 0: 1e-6, as in the thesis, for densities in [0, 1],
 /// and so in proportion to `intensity_range` squared for others, by which the schemes commute with affine
-/// maps. In float for ranges below 1e18.
+/// maps. Differences of more than 1e18 have no squares in float.
 template <class Scalar>
 Scalar weno_epsilon(Scalar intensity_range) {
   return std::max(Scalar(1e-6) * intensity_range * intensity_range, std::numeric_limits<Scalar>::min());
@@ -53,36 +53,55 @@ VOLSMOOTH_FORMULA Scalar cubic_correction(Scalar first, Scalar second, Scalar th
           cubic * (Scalar(1.5) * face * face - face * up + Scalar(0.25) * (up + courant * courant)));
 }
 
+/// The weights of stencils by their roughness, up to a common factor: `ideal` / (roughness + epsilon)^power
+/// times that of the least rough. So one of them is `ideal`, and none overflows, whatever the data.
+template <int kPower, std::size_t kStencils, class Scalar>
+VOLSMOOTH_FORMULA std::array<Scalar, kStencils> weno_weights(const std::array<Scalar, kStencils>& ideal,
+                                                             const std::array<Scalar, kStencils>& roughness,
+                                                             Scalar epsilon) {
+  Scalar least = roughness[0];
+  for (std::size_t i = 1; i < kStencils; ++i) least = std::min(least, roughness[i]);
+  std::array<Scalar, kStencils> weights = ideal;
+  for (std::size_t i = 0; i < kStencils; ++i) {
+    const Scalar smooth = (least + epsilon) / (roughness[i] + epsilon);
+    for (int factor = 0; factor < kPower; ++factor) weights[i] *= smooth;
+  }
+  return weights;
+}
+
 /// Equations A.2 and A.3, less rho_x, over h. The weights were made for the value on the face (courant = 0);
 /// for other regions the scheme is still exact for cubics.
 template <class Scalar>
 VOLSMOOTH_FORMULA Scalar weno7_correction(const UpwindCells<Scalar>& rho, Scalar courant, Scalar epsilon) {
-  constexpr std::array<Scalar, 4> kWeights{Scalar(1.0 / 35), Scalar(12.0 / 35), Scalar(18.0 / 35),
-                                           Scalar(4.0 / 35)};
-  Scalar sum = 0, weights = 0;
+  constexpr std::array<Scalar, 4> kIdeal{Scalar(1.0 / 35), Scalar(12.0 / 35), Scalar(18.0 / 35),
+                                         Scalar(4.0 / 35)};
+  std::array<Scalar, 4> correction, roughness;
   for (std::size_t i = 0; i < 4; ++i) {
     const Scalar first = rho[i + 1] - rho[i], second = rho[i + 2] - rho[i + 1],
                  third = rho[i + 3] - rho[i + 2];
-    const Scalar weight = kWeights[i] * (epsilon / (cubic_smoothness(first, second, third) + epsilon));
-    sum += weight * cubic_correction(first, second, third, Scalar{2} - static_cast<Scalar>(i), courant);
-    weights += weight;
+    correction[i] = cubic_correction(first, second, third, Scalar{2} - static_cast<Scalar>(i), courant);
+    roughness[i] = cubic_smoothness(first, second, third);
   }
-  return sum / weights;
+  const auto weights = weno_weights<1>(kIdeal, roughness, epsilon);
+  Scalar sum = 0, total = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    sum += weights[i] * correction[i];
+    total += weights[i];
+  }
+  return sum / total;
 }
 
-/// The classical WENO-5 value on a face between [2] and [3] of five cell averages along the flow, the third
-/// of them upstream, less that one (Jiang and Shu 1996). The differences of the five suffice.
+/// The classical WENO-5 value on a face between the third and fourth of five cell averages along the flow,
+/// less the third (Jiang and Shu 1996); from the four differences of the five.
 template <class Scalar>
-VOLSMOOTH_FORMULA Scalar weno5_correction(const std::array<Scalar, 4>& difference, Scalar epsilon) {
-  const auto& [a, b, c, d] = difference;
-  const auto weight = [epsilon](Scalar ideal, Scalar bend, Scalar slope) {
-    const Scalar roughness = Scalar(13.0 / 12) * bend * bend + Scalar(0.25) * slope * slope;
-    const Scalar smooth = epsilon / (roughness + epsilon);
-    return ideal * smooth * smooth;
-  };
-  const Scalar before = weight(Scalar(0.1), b - a, 3 * b - a);
-  const Scalar across = weight(Scalar(0.6), c - b, b + c);
-  const Scalar after = weight(Scalar(0.3), d - c, 3 * c - d);
+VOLSMOOTH_FORMULA Scalar weno5_correction(const std::array<Scalar, 4>& differences, Scalar epsilon) {
+  constexpr std::array<Scalar, 3> kIdeal{Scalar(0.1), Scalar(0.6), Scalar(0.3)};
+  const auto& [a, b, c, d] = differences;
+  const std::array<Scalar, 3> bend{b - a, c - b, d - c}, slope{3 * b - a, b + c, 3 * c - d};
+  std::array<Scalar, 3> roughness;
+  for (std::size_t i = 0; i < 3; ++i)
+    roughness[i] = Scalar(13.0 / 12) * bend[i] * bend[i] + Scalar(0.25) * slope[i] * slope[i];
+  const auto [before, across, after] = weno_weights<2>(kIdeal, roughness, epsilon);
   return (before * (5 * b - 2 * a) + across * (b + 2 * c) + after * (4 * c - d)) /
          (6 * (before + across + after));
 }

@@ -204,6 +204,16 @@ TEST(SweptMean, OverAWholeCellIsItsAverage) {
   EXPECT_EQ(swept_mean<kWeno7>(kRough, 1.0, 1e-6), kRough[3]);
 }
 
+/// As where mass gathers, or nearly constant data are far from 0.
+TEST(SweptMean, IsFiniteWhereDifferencesDwarfTheRange) {
+  UpwindCells<float> cells;
+  std::ranges::transform(kRough, cells.begin(), [](double value) { return static_cast<float>(1e9 * value); });
+  for (const float range : {0.0F, 1e-15F, 1.0F}) {
+    EXPECT_TRUE(std::isfinite(swept_mean<kWeno7>(cells, 0.3F, weno_epsilon(range)))) << range;
+    EXPECT_TRUE(std::isfinite(swept_mean<kWeno5>(cells, 0.3F, weno_epsilon(range)))) << range;
+  }
+}
+
 /// Values of 1e17 have squares near the end of float's range.
 TEST(SweptMean, IsFiniteForLargeFloats) {
   UpwindCells<float> cells;
