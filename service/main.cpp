@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <atomic>
 #include <filesystem>
 #include <iostream>
@@ -15,6 +16,7 @@
 #include "service/http/metrics.h"
 #include "service/http/server.h"
 #include "service/jobs/job_service.h"
+#include "service/jobs/machine.h"
 #include "service/pipeline/pipeline.h"
 
 namespace volsmooth {
@@ -39,7 +41,8 @@ void declare(CLI::App& app, Options& options) {
                  "Folder of the volumes, jobs and results; made when missing")
       ->envname("VOLSMOOTH_DATA")
       ->required();
-  app.add_option("--threads", options.jobs.threads, "Compute threads of a job; 0: all cores")
+  app.add_option("--threads", options.jobs.threads,
+                 "Compute threads of a job; 0: all cores that the daemon may use")
       ->envname("VOLSMOOTH_THREADS")
       ->check(CLI::Range(0, 4096))
       ->capture_default_str();
@@ -47,8 +50,9 @@ void declare(CLI::App& app, Options& options) {
       ->envname("VOLSMOOTH_WORKERS")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
-  app.add_option("--memory", options.jobs.memory_limit_bytes,
-                 "Memory of all running jobs, such as 8GB; 0: 80 % of the machine's")
+  app.add_option(
+         "--memory", options.jobs.memory_limit_bytes,
+         "Memory of all running jobs, such as 8GB; 0: 80 % of the machine's or, in a container, of its limit")
       ->envname("VOLSMOOTH_MEMORY")
       ->transform(CLI::AsSizeValue(false))
       ->capture_default_str();
@@ -91,9 +95,10 @@ class EphemeralFolder {
   std::filesystem::path path_;
 };
 
-/// 80 % of the machine's.
-std::int64_t most_of_the_memory() {
-  return std::int64_t{::sysconf(_SC_PHYS_PAGES)} * ::sysconf(_SC_PAGE_SIZE) / 10 * 8;
+/// Each may hold a file beside its socket; the rest is for the database, the jobs and the libraries.
+int connections_for(std::int64_t open_files) {
+  constexpr std::int64_t kOther = 128;
+  return static_cast<int>(std::max<std::int64_t>((open_files - kOther) / 2, 1));
 }
 
 sigset_t end_signals() {
@@ -143,8 +148,10 @@ int run(int argc, char** argv) {
     return app.exit(error) == 0 ? 0 : kUsageError;
   }
   options.server.max_upload_bytes = options.jobs.max_upload_bytes;
-  // Said once, for the single job as for all that run together.
-  if (options.jobs.memory_limit_bytes == 0) options.jobs.memory_limit_bytes = most_of_the_memory();
+  // The memory is said once, for the single job as for all that run together.
+  options.jobs = completed(std::move(options.jobs));
+  options.server.max_connections =
+      std::min(options.server.max_connections, connections_for(raise_open_files()));
 
   // Before any thread is there: all inherit the mask, and only sigwait takes them.
   const sigset_t signals = end_signals();

@@ -55,6 +55,10 @@ void with_threads(int threads, const std::function<void()>& body) {
   arena.execute(body);
 }
 
+int thread_count() {
+  return oneapi::tbb::this_task_arena::max_concurrency();
+}
+
 void lower_thread_priority() {
   const sched_param no_real_time{};
   sched_setscheduler(0, SCHED_BATCH, &no_real_time);

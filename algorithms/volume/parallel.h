@@ -20,6 +20,9 @@ void parallel_for(std::int64_t count, std::int64_t grain,
 /// quick.
 void with_threads(int threads, const std::function<void()>& body);
 
+/// How many threads a `parallel_for` uses here at most.
+int thread_count();
+
 /// Gives the calling thread the priority of a compute thread.
 void lower_thread_priority();
 

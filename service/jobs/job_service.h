@@ -18,14 +18,17 @@ namespace volsmooth {
 struct JobServiceSettings {
   std::filesystem::path data_dir;       ///< locked for this process; created when missing
   int workers = 2;                      ///< jobs that run at the same time
-  int threads = 0;                      ///< compute threads of a job; 0: all cores
-  std::int64_t memory_limit_bytes = 0;  ///< running jobs together; 0: 80 % of the machine's
+  int threads = 0;                      ///< compute threads of a job; 0: all cores that it may use
+  std::int64_t memory_limit_bytes = 0;  ///< running jobs together; 0: 80 % of what the process may use
   std::int64_t max_upload_bytes = std::int64_t{16} << 30;
   /// Uploads leave this much of the disk free, for the database and the results of accepted jobs.
   std::int64_t reserved_disk_bytes = std::int64_t{64} << 20;
   int max_deaths = 10;  ///< a job that was running at this many deaths of the daemon is failed
   int max_queued = 10'000;
 };
+
+/// With what follows from the machine filled in (jobs/machine.h).
+JobServiceSettings completed(JobServiceSettings settings);
 
 struct JobQuery {
   std::optional<JobState> state;

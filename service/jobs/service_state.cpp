@@ -1,7 +1,6 @@
 #include "service/jobs/service_state.h"
 
 #include <spdlog/spdlog.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <limits>
@@ -9,18 +8,10 @@
 
 #include "service/jobs/ids.h"
 #include "service/jobs/job_json.h"
+#include "service/jobs/machine.h"
 
 namespace volsmooth {
 namespace {
-
-std::int64_t most_of_the_machine() {
-  return static_cast<std::int64_t>(::sysconf(_SC_PHYS_PAGES)) * ::sysconf(_SC_PAGE_SIZE) / 10 * 8;
-}
-
-JobServiceSettings completed(JobServiceSettings settings) {
-  if (settings.memory_limit_bytes == 0) settings.memory_limit_bytes = most_of_the_machine();
-  return settings;
-}
 
 std::vector<std::string> names_of(const auto& offered) {
   std::vector<std::string> names;
@@ -32,6 +23,12 @@ std::vector<std::string> names_of(const auto& offered) {
 
 tl::unexpected<Problem> refuse(std::string slug, std::string detail, nlohmann::json members) {
   return tl::unexpected(Problem{std::move(slug), std::move(detail), std::move(members)});
+}
+
+JobServiceSettings completed(JobServiceSettings settings) {
+  if (settings.memory_limit_bytes == 0) settings.memory_limit_bytes = usable_memory_bytes() / 10 * 8;
+  if (settings.threads == 0) settings.threads = usable_cores();
+  return settings;
 }
 
 JobService::State::State(JobServiceSettings given, Engine computing)

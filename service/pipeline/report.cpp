@@ -1,8 +1,8 @@
 #include "service/pipeline/report.h"
 
 #include <fstream>
-#include <thread>
 
+#include "algorithms/volume/parallel.h"
 #include "service/jobs/job_json.h"
 
 namespace volsmooth {
@@ -78,7 +78,6 @@ ordered_json report_document(const ComputeTask& task, const std::vector<std::str
                              const std::vector<FoliationRow>& foliation,
                              const std::vector<SurfaceRow>& surfaces, const ReportTiming& timing) {
   const StoredVolume& volume = task.volume;
-  const int threads = task.threads > 0 ? task.threads : static_cast<int>(std::thread::hardware_concurrency());
   return {{"version", VOLSMOOTH_VERSION},
           {"method", task.order.method},
           {"parameters", ordered_json(to_json(task.parameters))},
@@ -95,7 +94,7 @@ ordered_json report_document(const ComputeTask& task, const std::vector<std::str
             {"flow_seconds", timing.flow_seconds},
             {"surface_seconds", timing.surface_seconds},
             {"write_seconds", timing.write_seconds}}},
-          {"threads", threads},
+          {"threads", thread_count()},
           {"peak_memory_bytes", peak_memory_bytes()}};
 }
 

@@ -36,7 +36,7 @@ struct ReportTiming {
 /// the same time share it.
 void restart_peak_memory();
 
-/// `report.json` of the contract.
+/// `report.json` of the contract; its `threads` are those of the calling thread's arena (see `with_threads`).
 nlohmann::ordered_json report_document(const ComputeTask& task, const std::vector<std::string>& warnings,
                                        const std::vector<FoliationRow>& foliation,
                                        const std::vector<SurfaceRow>& surfaces, const ReportTiming& timing);

@@ -1,6 +1,7 @@
 #include "algorithms/volume/parallel.h"
 
 #include <gtest/gtest.h>
+#include <sched.h>
 
 #include <atomic>
 #include <mutex>
@@ -59,6 +60,18 @@ TEST(WithThreads, UsesNoMoreThreadsThanAsked) {
     });
     EXPECT_LE(seen.size(), static_cast<std::size_t>(threads));
   }
+}
+
+TEST(WithThreads, SaysHowManyTheyAre) {
+  for (const int threads : {1, 3}) {
+    with_threads(threads, [&] { EXPECT_EQ(thread_count(), threads); });
+  }
+}
+
+TEST(WithThreads, AllCoresAreThoseOfTheAffinityMask) {
+  cpu_set_t mask;
+  ASSERT_EQ(::sched_getaffinity(0, sizeof mask, &mask), 0);
+  with_threads(0, [&] { EXPECT_EQ(thread_count(), CPU_COUNT(&mask)); });
 }
 
 TEST(WithThreads, PassesExceptionsOn) {

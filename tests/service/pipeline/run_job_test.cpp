@@ -11,6 +11,7 @@
 
 #include "algorithms/formats/nifti.h"
 #include "algorithms/surface/otsu.h"
+#include "algorithms/volume/parallel.h"
 #include "service/pipeline/pipeline.h"
 #include "tests/support/mesh_checks.h"
 #include "tests/support/nifti_maker.h"
@@ -201,6 +202,20 @@ TEST_F(RunJob, CanBeCancelledWithinEveryStage) {
     task.threads = 1;
     EXPECT_THROW(static_cast<void>(engine_.compute(task, cancel)), Cancelled) << stage;
   }
+}
+
+TEST_F(RunJob, TheReportSaysHowManyThreadsWereUsed) {
+  ComputeTask task = task_for(ball());
+  for (const int threads : {1, 3}) {
+    task.threads = threads;
+    run(task);
+    EXPECT_EQ(report()["threads"], threads);
+    std::filesystem::remove_all(task.output_dir);
+    std::filesystem::create_directory(task.output_dir);
+  }
+  task.threads = 0;
+  run(task);
+  with_threads(0, [&] { EXPECT_EQ(report()["threads"], thread_count()); });
 }
 
 TEST_F(RunJob, AVolumeThatIsAllInsideIsItsBox) {
