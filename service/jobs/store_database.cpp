@@ -1,13 +1,13 @@
 #include "service/jobs/store_database.h"
 
+#include <array>
 #include <stdexcept>
+#include <string>
 
 namespace volsmooth {
 namespace {
 
-constexpr std::int64_t kSchemaVersion = 1;
-
-constexpr const char* kSchema = R"(
+constexpr const char* kFirstSchema = R"(
   CREATE TABLE volumes (
     sequence   INTEGER PRIMARY KEY AUTOINCREMENT,
     id         TEXT NOT NULL UNIQUE,
@@ -68,14 +68,23 @@ constexpr const char* kSchema = R"(
   CREATE TABLE audit (sequence INTEGER PRIMARY KEY AUTOINCREMENT, at_ms INTEGER NOT NULL, subject TEXT NOT NULL,
                       action TEXT NOT NULL) STRICT;
   CREATE TABLE starts (number INTEGER PRIMARY KEY AUTOINCREMENT, at_ms INTEGER NOT NULL) STRICT;
-
-  PRAGMA user_version = 1;
 )";
 
-std::int64_t schema_version(Database& database) {
+/// SQLite does not see that a state asked for is one of an IN list, so every look for a queued job went
+/// through all jobs.
+constexpr const char* kIndexByState = R"(
+  DROP INDEX unfinished_jobs;
+  CREATE INDEX jobs_by_state ON jobs (state, sequence);
+)";
+
+/// What makes each version of the schema of the one before.
+constexpr std::array kVersions = {kFirstSchema, kIndexByState};
+constexpr std::size_t kNewestVersion = kVersions.size();
+
+std::size_t schema_version(Database& database) {
   Statement version = database.query("PRAGMA user_version");
   version.step();
-  return version.integer(0);
+  return static_cast<std::size_t>(version.integer(0));
 }
 
 void check_integrity(Database& database) {
@@ -88,9 +97,11 @@ void check_integrity(Database& database) {
 std::int64_t prepare(Database& database) {
   check_integrity(database);
   Transaction transaction(database, Transaction::Kind::kWrite);
-  if (schema_version(database) > kSchemaVersion)
+  const std::size_t version = schema_version(database);
+  if (version > kNewestVersion)
     throw std::runtime_error("the database was written by a later version of volsmoothd");
-  if (schema_version(database) == 0) database.execute(kSchema);
+  for (std::size_t next = version; next < kNewestVersion; ++next) database.execute(kVersions[next]);
+  database.execute(("PRAGMA user_version = " + std::to_string(kNewestVersion)).c_str());
   database.run("INSERT INTO starts (at_ms) VALUES (?)", milliseconds_of(now_in_milliseconds()));
   Statement newest = database.query("SELECT max(number) FROM starts");
   newest.step();

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <map>
 #include <random>
 #include <set>
@@ -221,6 +222,52 @@ TEST_F(JobStoreTest, StateEventsAreInOrderAndEndWithTheFinalOne) {
   EXPECT_EQ(events[2].kind, "progress");
   EXPECT_NE(events[3].data.find("succeeded"), std::string::npos);
   EXPECT_EQ(jobs_.events_after("j-1", events[1].number).size(), 2u);
+}
+
+/// So many jobs that ended long ago, each with an order of a kilobyte.
+void fill(const std::filesystem::path& file, int count) {
+  Database(file, Database::Access::kWriter)
+      .run(
+          "WITH RECURSIVE number(n) AS (SELECT 1 UNION ALL SELECT n + 1 FROM number WHERE n < ?) "
+          "INSERT INTO jobs (id, volume, method, label, state, job_order, parameters, memory_bytes, "
+          "created_ms, stage) SELECT 'old-' || n, 'v-1', 'm', '', 'failed', printf('%1000s', ''), '{}', 1, "
+          "0, '' "
+          "FROM number",
+          count);
+}
+
+// A look through all 20,000 jobs takes 10 ms, by the index 0.02 ms.
+TEST_F(JobStoreTest, OldJobsDoNotSlowDownTheLookForWork) {
+  fill(scratch_.path() / "test.db", 20'000);
+  const auto start = std::chrono::steady_clock::now();
+  for (int look = 0; look < 100; ++look) {
+    EXPECT_FALSE(jobs_.claim(kAnyMemory));
+    EXPECT_TRUE(jobs_.running().empty());
+  }
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::milliseconds(300));
+}
+
+TEST(StoreDatabase, TakesOverWhatAnEarlierVersionWrote) {
+  const ScratchFolder scratch;
+  const auto file = scratch / "test.db";
+  {
+    StoreDatabase(file).write(
+        [](Database& database) { return database.run("INSERT INTO tombstones VALUES ('j-1', 0)"); });
+  }
+  {
+    Database as_it_was(file, Database::Access::kWriter);
+    as_it_was.execute(
+        "DROP INDEX jobs_by_state; CREATE INDEX unfinished_jobs ON jobs (state, sequence) "
+        "WHERE state IN ('queued', 'running'); PRAGMA user_version = 1;");
+  }
+  StoreDatabase now(file);
+  EXPECT_EQ(now.start_number(), 2);
+  EXPECT_TRUE(now.read([](Database& database) { return is_buried(database, "j-1"); }));
+  EXPECT_TRUE(now.read([](Database& database) {
+    return database.query("SELECT 1 FROM sqlite_schema WHERE name = 'jobs_by_state'").step();
+  }));
+  Database(file, Database::Access::kWriter).execute("PRAGMA user_version = 9");
+  EXPECT_THROW(StoreDatabase{file}, std::runtime_error);
 }
 
 }  // namespace
