@@ -132,8 +132,8 @@ void serve(const Options& options) {
   int received = 0;
   sigwait(&signals, &received);
   log_event("stopping", received == SIGTERM ? "SIGTERM" : "SIGINT");
+  jobs.stop();  // first: those whose uploads are being verified still get an answer
   server.stop();
-  jobs.stop();
   if (store_lost)
     throw std::runtime_error("nobody knows whether a commit stands; the next start finds out and recovers");
 }

@@ -135,9 +135,9 @@ struct Engine {
   };
   std::vector<Format> mesh_formats;
 
-  /// Verifies an uploaded file completely.
+  /// Verifies an uploaded file completely; that may take a while.
   std::function<tl::expected<VolumeFacts, Problem>(const std::filesystem::path& file,
-                                                   const UploadOptions& options)>
+                                                   const UploadOptions& options, const Progress& report)>
       inspect;
   /// Checks an order against its volume and resolves its parameters; cheap.
   std::function<tl::expected<JobPlan, Problem>(const JobOrder& order, const VolumeFacts& volume)> plan;

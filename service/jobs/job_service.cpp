@@ -57,7 +57,7 @@ tl::expected<StoredVolume, Problem> JobService::keep_volume(IncomingFile file, c
   if (file.bytes() > state_->settings.max_upload_bytes) return too_large(state_->settings.max_upload_bytes);
   StoredVolume volume;
   volume.sha256 = file.finish();
-  auto facts = state_->engine.inspect(file.path(), options);
+  auto facts = state_->verify(file.path(), options);
   if (!facts) return tl::unexpected(std::move(facts.error()));
   volume.id = new_id("v-");
   volume.options = options;

@@ -63,8 +63,8 @@ struct ServiceStatistics {
 /// The rules of uploads and jobs: everything the outside can ask for, durable before it is answered.
 /// Thread-safe; calls may block on the disk, none computes except `keep_volume`, which verifies the whole
 /// file. Problems it gives (slugs): not-found, gone, bad-id, volume-in-use, insufficient-storage,
-/// content-too-large, queue-full, unknown-algorithm, and what the engine's `inspect` and `plan` give. Throws
-/// when the store itself fails.
+/// content-too-large, queue-full, not-ready, unknown-algorithm, and what the engine's `inspect` and `plan`
+/// give. Throws when the store itself fails.
 class JobService {
  public:
   JobService(JobServiceSettings settings,
@@ -72,7 +72,9 @@ class JobService {
   ~JobService();
 
   void start();  ///< workers begin to claim jobs
-  void stop();   ///< stops claiming; running jobs are interrupted and requeued without counting against them
+  /// Stops claiming and verifying. Running jobs are interrupted and queued again, without counting against
+  /// them; uploads that are being verified are refused as not-ready.
+  void stop();
 
   const Engine& engine() const;
 

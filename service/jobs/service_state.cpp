@@ -116,6 +116,19 @@ void JobService::State::tell_final(const Job& job) const {
   if (observer) observer(job);
 }
 
+tl::expected<VolumeFacts, Problem> JobService::State::verify(const std::filesystem::path& file,
+                                                             const UploadOptions& options) const {
+  const Progress unless_stopping = [this](double) {
+    if (stopping) throw Cancelled();
+  };
+  try {
+    unless_stopping(0);
+    return engine.inspect(file, options, unless_stopping);
+  } catch (const Cancelled&) {
+    return refuse("not-ready", "The service is stopping; upload the volume again when it is back.");
+  }
+}
+
 tl::unexpected<Problem> JobService::State::missing(std::string_view id, std::string_view what) {
   const std::string name(what);
   if (!is_id_shaped(id))

@@ -34,6 +34,9 @@ struct JobService::State {
   void tell_final(const Job& job) const;
 
   // Answers.
+  /// What the engine says of an upload; not-ready when the service is stopped meanwhile.
+  tl::expected<VolumeFacts, Problem> verify(const std::filesystem::path& file,
+                                            const UploadOptions& options) const;
   /// Why there is nothing of that id: bad-id, gone or not-found.
   tl::unexpected<Problem> missing(std::string_view id, std::string_view what);
   /// The same, but deleted is what it should be.

@@ -31,9 +31,9 @@ VolumeFacts facts_of(const VolumeDescription& description) {
 }  // namespace
 
 tl::expected<VolumeFacts, Problem> inspect_upload(const std::filesystem::path& file,
-                                                  const UploadOptions& options,
-                                                  const PipelineLimits& limits) {
-  const auto description = inspect_nifti(file, read_options(options, limits));
+                                                  const UploadOptions& options, const PipelineLimits& limits,
+                                                  const Progress& report) {
+  const auto description = inspect_nifti(file, read_options(options, limits), report);
   if (!description) return tl::unexpected(problem_from(description.error()));
   if (!is_orthogonal(description->map)) {
     return tl::unexpected(

@@ -12,9 +12,8 @@ Engine make_engine(const PipelineLimits& limits) {
   for (const MeshFormat& format : mesh_formats()) {
     engine.mesh_formats.push_back({format.name, format.media_type, format.description});
   }
-  engine.inspect = [limits](const std::filesystem::path& file, const UploadOptions& options) {
-    return inspect_upload(file, options, limits);
-  };
+  engine.inspect = [limits](const std::filesystem::path& file, const UploadOptions& options,
+                            const Progress& report) { return inspect_upload(file, options, limits, report); };
   engine.plan = [limits](const JobOrder& order, const VolumeFacts& volume) {
     return plan_job(order, volume, limits);
   };

@@ -11,7 +11,8 @@ namespace volsmooth {
 
 /// The three functions of an `Engine`; what each promises stands there.
 tl::expected<VolumeFacts, Problem> inspect_upload(const std::filesystem::path& file,
-                                                  const UploadOptions& options, const PipelineLimits& limits);
+                                                  const UploadOptions& options, const PipelineLimits& limits,
+                                                  const Progress& report);
 tl::expected<JobPlan, Problem> plan_job(const JobOrder& order, const VolumeFacts& volume,
                                         const PipelineLimits& limits);
 tl::expected<std::vector<Result>, Problem> run_job(const ComputeTask& task, const StageProgress& report,

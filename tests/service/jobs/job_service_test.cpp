@@ -392,6 +392,20 @@ TEST_F(JobServiceTest, ACommitOfUnknownOutcomeIsToldOnceAndEndsAllWriting) {
   EXPECT_TRUE(service_->submit(order_for(volume.id)));
 }
 
+TEST_F(JobServiceTest, AStopEndsTheVerificationOfUploads) {
+  open_and_start();
+  std::string answer;
+  std::thread uploading([&] { answer = slug_of(upload(*service_, "gate stays shut")); });
+  while (fake_.at_gate == 0) std::this_thread::yield();
+  service_->stop();
+  uploading.join();
+  EXPECT_EQ(answer, "not-ready");
+  EXPECT_EQ(slug_of(upload(*service_, "too late")), "not-ready");
+  EXPECT_TRUE(service_->volumes().empty());
+  for (const char* folder : {"tmp", "volumes"})
+    EXPECT_TRUE(std::filesystem::is_empty(settings().data_dir / folder)) << folder;
+}
+
 TEST_F(JobServiceTest, SaysWhenItIsReady) {
   open();
   EXPECT_TRUE(service_->not_ready_because());

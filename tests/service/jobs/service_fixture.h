@@ -23,13 +23,13 @@ inline MethodInfo blur_method() {
   return method;
 }
 
-/// An engine that takes any file that does not begin with "bad", and whose jobs write their volume back. The
-/// job's label says what is to happen in it.
+/// An engine that takes any file that does not begin with "bad", one that begins with "gate" when it is open,
+/// and whose jobs write their volume back. The job's label says what is to happen in it.
 struct FakeEngine {
   std::mutex mutex;
   std::condition_variable changed;
   bool gate_open = false;
-  std::atomic<int> computing = 0, most_computing = 0, computed = 0;
+  std::atomic<int> computing = 0, most_computing = 0, computed = 0, at_gate = 0;
   std::atomic<std::int64_t> memory_bytes = 1;
 
   void open_gate() {
@@ -40,6 +40,7 @@ struct FakeEngine {
 
   /// Reports until the gate is open: a job that lasts as long as the test wants.
   void wait_at_gate(const StageProgress& report) {
+    ++at_gate;
     std::unique_lock lock(mutex);
     while (!gate_open) {
       lock.unlock();
@@ -85,11 +86,12 @@ struct FakeEngine {
     Engine engine;
     engine.methods = {blur_method()};
     engine.mesh_formats = {{"stl", "model/stl", "STL"}, {"glb", "model/gltf-binary", "glTF"}};
-    engine.inspect = [](const std::filesystem::path& file,
-                        const UploadOptions&) -> tl::expected<VolumeFacts, Problem> {
-      std::string start(3, ' ');
-      std::ifstream(file, std::ios::binary).read(start.data(), 3);
-      if (start == "bad") return tl::unexpected(Problem{"nifti-bad-header", "Not this one."});
+    engine.inspect = [this](const std::filesystem::path& file, const UploadOptions&,
+                            const Progress& report) -> tl::expected<VolumeFacts, Problem> {
+      std::string start(4, ' ');
+      std::ifstream(file, std::ios::binary).read(start.data(), 4);
+      if (start == "gate") wait_at_gate([&](std::string_view, double fraction) { report(fraction); });
+      if (start.starts_with("bad")) return tl::unexpected(Problem{"nifti-bad-header", "Not this one."});
       VolumeFacts facts;
       facts.format = "nifti-1";
       facts.size = {4, 5, 6};

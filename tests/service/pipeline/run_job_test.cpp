@@ -54,7 +54,7 @@ class RunJob : public testing::Test {
     task.volume_file = folder_.put("volume", {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
     task.volume.sha256 = "0123";
     task.volume.options = options;
-    const auto facts = engine_.inspect(task.volume_file, options);
+    const auto facts = engine_.inspect(task.volume_file, options, no_progress);
     EXPECT_TRUE(facts) << facts.error().detail;
     task.volume.facts = *facts;
     task.output_dir = folder_ / "results";
@@ -276,7 +276,7 @@ TEST(Inspect, AShearedGridIsRefused) {
   file.srow = {1, 0.2, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
   const auto bytes = test::bytes_of(file);
   const auto path = folder.put("volume", {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
-  const auto facts = make_engine({}).inspect(path, {});
+  const auto facts = make_engine({}).inspect(path, {}, no_progress);
   ASSERT_FALSE(facts);
   EXPECT_EQ(facts.error().slug, "unsupported-geometry");
 }
