@@ -73,8 +73,16 @@ tl::expected<Job, Problem> submit_form(Api& api, Request& request) {
 }
 
 /// RFC: https://html.spec.whatwg.org/multipage/server-sent-events.html#event-stream-interpretation
+/// What is kept of an event has the problem as the jobs know it.
+std::string data_of(const JobEvent& event) {
+  if (event.kind != "state") return event.data;
+  auto data = nlohmann::json::parse(event.data);
+  if (data.contains("error")) data["error"] = completed_problem(std::move(data["error"]));
+  return data.dump();
+}
+
 std::string as_event(const JobEvent& event) {
-  return "id: " + event.id + "\nevent: " + event.kind + "\ndata: " + event.data + "\n\n";
+  return "id: " + event.id + "\nevent: " + event.kind + "\ndata: " + data_of(event) + "\n\n";
 }
 
 Subscribe subscribe_to(Api& api, const std::string& id) {

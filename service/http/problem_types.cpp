@@ -4,8 +4,12 @@
 #include <array>
 #include <stdexcept>
 
+#include "service/jobs/job_json.h"
+
 namespace volsmooth {
 namespace {
+
+constexpr std::string_view kUriStart = "/problems/";
 
 constexpr auto kTypes = std::to_array<ProblemType>({
     // The request's framing and head
@@ -95,12 +99,14 @@ const ProblemType& problem_type(std::string_view slug) {
 }
 
 nlohmann::json problem_document(const Problem& problem) {
-  const ProblemType& type = problem_type(problem.slug);
-  nlohmann::json document = problem.members;
-  document["type"] = "/problems/" + problem.slug;
+  return completed_problem(to_json(problem));
+}
+
+nlohmann::json completed_problem(nlohmann::json document) {
+  const auto uri = document.at("type").get<std::string>();
+  const ProblemType& type = problem_type(std::string_view(uri).substr(kUriStart.size()));
   document["title"] = type.title;
   document["status"] = type.status;
-  document["detail"] = problem.detail;
   return document;
 }
 

@@ -23,5 +23,7 @@ const ProblemType& problem_type(std::string_view slug);
 
 /// The `application/problem+json` document of a problem.
 nlohmann::json problem_document(const Problem& problem);
+/// The same of one that has all but title and status already (`to_json` of jobs).
+nlohmann::json completed_problem(nlohmann::json document);
 
 }  // namespace volsmooth
