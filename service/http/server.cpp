@@ -27,7 +27,8 @@ using asio::local::stream_protocol;
 using boost::system::error_code;
 
 constexpr std::string_view kUnixPrefix = "unix:";
-constexpr int kQuickThreads = 4;
+constexpr int kReadingThreads = 4;
+constexpr int kWritingThreads = 2;  // one at a time gets at the store; the other prepares what comes next
 constexpr int kBulkThreads = 4;
 constexpr int kVerifyingThreads = 2;
 constexpr auto kGrace = std::chrono::seconds(5);
@@ -113,8 +114,8 @@ std::string too_many_connections() {
 
 struct Server::State {
   State(ServerSettings given, Api api)
-      : settings(std::move(given)), context{settings, api,  {},       body_rules(settings, api),
-                                            quick,    bulk, verifying} {
+      : settings(std::move(given)), context{settings, api,     {},   body_rules(settings, api),
+                                            reading,  writing, bulk, verifying} {
     for (const auto& name : settings.host_names) context.hosts.names.push_back(lowered(name));
     listen();
     thread = std::jthread([this] { io.run(); });
@@ -212,7 +213,8 @@ struct Server::State {
   std::function<void()> close_acceptor;
   asio::io_context io{1};
   // Gone before the I/O context: their threads hand results to it.
-  ThreadPool quick{kQuickThreads, ThreadPool::Priority::kNormal};
+  ThreadPool reading{kReadingThreads, ThreadPool::Priority::kNormal};
+  ThreadPool writing{kWritingThreads, ThreadPool::Priority::kNormal};
   ThreadPool bulk{kBulkThreads, ThreadPool::Priority::kNormal};
   ThreadPool verifying{kVerifyingThreads, ThreadPool::Priority::kLow};
   std::jthread thread;

@@ -87,7 +87,7 @@ Session::Awaitable<void> Session::serve(Exchange& exchange) {
     co_await refuse_unread(exchange, admitted.error());
     co_return;
   }
-  auto receiver = co_await run_guarded(context_.quick, exchange, [&] {
+  auto receiver = co_await run_guarded(context_.reading, exchange, [&] {
     return receiver_for(exchange.route->body, exchange.request, context_.body_rules);
   });
   if (receiver)
@@ -127,12 +127,14 @@ Session::Awaitable<void> Session::handle(Exchange& exchange, std::unique_ptr<Bod
     co_return;
   }
   exchange.keep_alive = request.head.keep_alive && !context_.stopping;
-  auto complete = co_await run_guarded(context_.quick, exchange, [&] { return receiver->finish(); });
+  auto complete = co_await run_guarded(context_.reading, exchange, [&] { return receiver->finish(); });
   if (!complete) {
     co_await send(exchange, tl::unexpected(complete.error()));
     co_return;
   }
-  ThreadPool& pool = request.file ? context_.verifying : context_.quick;
+  ThreadPool& pool = request.file                      ? context_.verifying
+                     : exchange.route->method == "GET" ? context_.reading
+                                                       : context_.writing;
   auto reply =
       co_await run_guarded(pool, exchange, [&] { return exchange.route->handle(context_.api, request); });
   co_await send(exchange, std::move(reply));
@@ -162,7 +164,7 @@ Session::Awaitable<tl::expected<void, Problem>> Session::receive_body(Exchange& 
 
   const auto wanted = std::min<std::int64_t>(head.content_length.value_or(kBodyBlockBytes), kBodyBlockBytes);
   std::vector<char> block(static_cast<std::size_t>(head.has_body() ? wanted : 1));
-  ThreadPool& pool = exchange.request.file ? context_.bulk : context_.quick;
+  ThreadPool& pool = exchange.request.file ? context_.bulk : context_.reading;
   for (;;) {
     const auto bytes = co_await connection_.read_body(block, context_.settings.body_seconds);
     if (!bytes) co_return tl::unexpected(problem_of(bytes.error()));

@@ -21,8 +21,9 @@ struct SessionContext {
   Api api;
   HostNames hosts;
   BodyRules body_rules;
-  ThreadPool& quick;      ///< for the store: milliseconds
-  ThreadPool& bulk;       ///< for the bytes of files: as slow as the disk
+  ThreadPool& reading;  ///< for looks at the store: milliseconds
+  ThreadPool& writing;  ///< for steps of the store, each with its fsync: nobody who only looks waits for them
+  ThreadPool& bulk;     ///< for the bytes of files: as slow as the disk
   ThreadPool& verifying;  ///< for handlers that were given a file: seconds
   std::uint64_t last_request = 0;
   bool stopping = false;

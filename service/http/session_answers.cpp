@@ -106,7 +106,7 @@ Session::Awaitable<bool> Session::send_events(Exchange& exchange, EventStream& s
 
   bool connected = true;
   for (bool last = false; connected && !last && !context_.stopping;) {
-    auto batch = co_await run_guarded(context_.quick, exchange, [&] { return stream.next(); });
+    auto batch = co_await run_guarded(context_.reading, exchange, [&] { return stream.next(); });
     if (!batch) break;  // the job is gone, and with it what there was to say
     last = batch->last;
     if (!batch->text.empty()) connected = co_await write(exchange, framed(batch->text));
@@ -133,7 +133,7 @@ Session::Awaitable<Reply> Session::wait_for(Exchange& exchange, LongPoll& poll, 
 
   Reply reply = std::move(head);
   for (bool waiting = true; waiting;) {
-    auto answer = co_await run_guarded(context_.quick, exchange, [&] { return poll.ask(); });
+    auto answer = co_await run_guarded(context_.reading, exchange, [&] { return poll.ask(); });
     if (!answer) {
       reply = tl::unexpected(answer.error());
       break;

@@ -103,6 +103,7 @@ struct FakeEngine {
       return facts;
     };
     engine.plan = [this](const JobOrder& order, const VolumeFacts&) -> tl::expected<JobPlan, Problem> {
+      if (order.label == "plan at gate") wait_at_gate([](std::string_view, double) {});
       return JobPlan{order.parameters, memory_bytes};
     };
     engine.compute = [this](const ComputeTask& task, const StageProgress& report) {
