@@ -2,6 +2,7 @@
 
 #include <sys/socket.h>
 
+#include <algorithm>
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/beast/core/buffers_to_string.hpp>
@@ -29,6 +30,10 @@ constexpr auto kAwait = asio::as_tuple(asio::use_awaitable);
 constexpr std::size_t kReadBytes = 65536;
 constexpr double kDiscardSeconds = 2;
 
+/// A block is given up when it takes so many times longer than may pass without a byte of it: otherwise a
+/// byte now and then would hold a connection, and what it has reserved, for ever.
+constexpr double kSlownessAllowed = 10;
+
 std::chrono::steady_clock::duration in_seconds(double seconds) {
   return std::chrono::duration_cast<std::chrono::steady_clock::duration>(
       std::chrono::duration<double>(seconds));
@@ -52,8 +57,10 @@ std::string_view text_of(const beast::flat_buffer& buffer) {
 /// by then, but not yet seen, cannot be cancelled: a loop of reads asks `expired` before each of them.
 class Connection::Deadline {
  public:
-  Deadline(Connection& connection, double seconds) : connection_(connection) {
-    connection.timer_.expires_after(in_seconds(seconds));
+  Deadline(Connection& connection, double seconds)
+      : Deadline(connection, std::chrono::steady_clock::now() + in_seconds(seconds)) {}
+  Deadline(Connection& connection, std::chrono::steady_clock::time_point end) : connection_(connection) {
+    connection.timer_.expires_at(end);
     connection.timer_.async_wait([armed = std::weak_ptr(expired_), &connection](error_code cancelled) {
       const auto expired = armed.lock();
       if (cancelled || !expired) return;
@@ -71,6 +78,20 @@ class Connection::Deadline {
  private:
   Connection& connection_;
   std::shared_ptr<bool> expired_ = std::make_shared<bool>(false);
+};
+
+/// The deadlines of the steps in which one block goes over.
+class Connection::BlockDeadline {
+ public:
+  explicit BlockDeadline(double seconds_per_step)
+      : step_(in_seconds(seconds_per_step)), end_(now() + in_seconds(kSlownessAllowed * seconds_per_step)) {}
+  bool expired() const { return now() >= end_; }
+  std::chrono::steady_clock::time_point of_next_step() const { return std::min(now() + step_, end_); }
+
+ private:
+  static std::chrono::steady_clock::time_point now() { return std::chrono::steady_clock::now(); }
+  const std::chrono::steady_clock::duration step_;
+  const std::chrono::steady_clock::time_point end_;
 };
 
 struct Connection::Codec {
@@ -128,10 +149,12 @@ bool Connection::begin_body(const Head& head) {
 asio::awaitable<tl::expected<std::string_view, ReadFailure>> Connection::read_body(std::span<char> block,
                                                                                    double seconds_per_read) {
   auto& [received, head_bytes, body] = *codec_;
+  const BlockDeadline whole(seconds_per_read);
   std::size_t filled = 0;
   while (!body.done() && filled < block.size()) {
     if (received.size() == 0) {
-      const Deadline deadline(*this, seconds_per_read);
+      if (whole.expired()) co_return tl::unexpected(ReadFailure::kTimeout);
+      const Deadline deadline(*this, whole.of_next_step());
       const auto [error, count] = co_await socket_.async_read_some(received.prepare(kReadBytes), kAwait);
       if (error) co_return tl::unexpected(deadline.failure());
       received.commit(count);
@@ -145,8 +168,10 @@ asio::awaitable<tl::expected<std::string_view, ReadFailure>> Connection::read_bo
 }
 
 asio::awaitable<bool> Connection::write(std::string_view bytes, double seconds_per_write) {
+  const BlockDeadline whole(seconds_per_write);
   while (!bytes.empty()) {
-    const Deadline deadline(*this, seconds_per_write);
+    if (whole.expired()) co_return false;
+    const Deadline deadline(*this, whole.of_next_step());
     const auto [error, count] = co_await socket_.async_write_some(asio::buffer(bytes), kAwait);
     if (error) co_return false;
     bytes.remove_prefix(count);

@@ -36,11 +36,12 @@ class Connection {
   /// Goes on from the head to its body; false if Beast reads the head in another way than `head` does.
   bool begin_body(const Head& head);
 
-  /// The next bytes of the body in `block`: as many as it holds, fewer at the end, then none.
+  /// The next bytes of the body in `block`: as many as it holds, fewer at the end, then none. All of them in
+  /// ten times the time that each read has.
   boost::asio::awaitable<tl::expected<std::string_view, ReadFailure>> read_body(std::span<char> block,
                                                                                 double seconds_per_read);
 
-  /// Whether all of it was taken; each part of it within `seconds_per_write`.
+  /// Whether all of it was taken; each part of it within `seconds_per_write`, the whole in ten times that.
   boost::asio::awaitable<bool> write(std::string_view bytes, double seconds_per_write);
 
   /// Closes so that the peer sees what was written even while it still sends (RFC 9112, 9.6).
@@ -55,6 +56,7 @@ class Connection {
 
  private:
   class Deadline;
+  class BlockDeadline;
   struct Codec;
   Socket socket_;
   boost::asio::steady_timer timer_;

@@ -194,6 +194,17 @@ TEST_F(Framing, StalledHeadAndBodyMeetTheirDeadlines) {
   }
 }
 
+TEST_F(Framing, ABodyThatTricklesIsGivenUp) {
+  start({.listen = "127.0.0.1:0", .body_seconds = 0.1});  // so a second for a block
+  auto client = connect();
+  client.send("POST /v1/volumes HTTP/1.1\r\nHost: localhost\r\nContent-Length: 250\r\n\r\n");
+  std::jthread sender([&](const std::stop_token& over) {
+    for (int i = 0; i < 250 && !over.stop_requested() && client.send("x"); ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));  // five seconds in all
+  });
+  EXPECT_EQ(slug(client.receive()), "request-timeout");
+}
+
 TEST_F(Framing, IdleConnectionIsClosedWithoutAWord) {
   start({.listen = "127.0.0.1:0", .idle_seconds = 2});
   auto client = connect();
