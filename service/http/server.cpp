@@ -157,9 +157,18 @@ struct Server::State {
     while (acceptor->is_open()) {
       auto [error, accepted] = co_await acceptor->async_accept(asio::as_tuple(asio::use_awaitable));
       if (!error)
-        begin(Socket(std::move(accepted)));
+        begin_guarded(Socket(std::move(accepted)));
       else if (acceptor->is_open())
         co_await asio::steady_timer(io, kPauseAfterAcceptFailure).async_wait(asio::use_awaitable);
+    }
+  }
+
+  /// One connection that cannot be served must not end the loop that accepts all others.
+  void begin_guarded(Socket socket) {
+    try {
+      begin(std::move(socket));
+    } catch (const std::exception& error) {
+      log_fault(0, "", error.what());
     }
   }
 
