@@ -8,12 +8,14 @@
 #include "algorithms/formats/gzip_writer.h"
 #include "algorithms/formats/nifti.h"
 #include "algorithms/volume/parallel.h"
+#include "tests/support/bad_file.h"
 #include "tests/support/nifti_maker.h"
 #include "tests/support/temporary_file.h"
 
 namespace volsmooth {
 namespace {
 
+using test::BadFile;
 using test::ByteVector;
 using test::gzipped;
 using test::NiftiFile;
@@ -72,28 +74,15 @@ ByteVector header_checksum_of(const ByteVector& header) {
   return {std::byte(crc & 0xff), std::byte(crc >> 8 & 0xff)};
 }
 
-struct BadGzip {
-  std::string name;
-  std::string slug;
-  std::function<ByteVector()> make;
-};
-
-class RefusedGzip : public testing::TestWithParam<BadGzip> {};
+class RefusedGzip : public testing::TestWithParam<BadFile> {};
 
 TEST_P(RefusedGzip, GetsItsSlugFromBothReaders) {
-  const test::TemporaryFile file(GetParam().make());
-  const auto inspected = inspect_nifti(file.path(), {});
-  ASSERT_FALSE(inspected.has_value());
-  EXPECT_EQ(inspected.error().slug, GetParam().slug) << inspected.error().detail;
-  EXPECT_FALSE(inspected.error().detail.empty());
-  const auto read = read_nifti(file.path(), {});
-  ASSERT_FALSE(read.has_value());
-  EXPECT_EQ(read.error().slug, GetParam().slug);
+  expect_refused(GetParam());
 }
 
 enum Flag : char { kHeaderCrc = 2, kExtra = 4, kName = 8, kComment = 16, kReserved = 32 };
 
-const std::vector<BadGzip> kBadGzips{
+const std::vector<BadFile> kBadGzips{
     {"G1_cut_in_the_data", "gzip-truncated",
      [] {
        ByteVector file = good();
@@ -157,8 +146,7 @@ const std::vector<BadGzip> kBadGzips{
     {"G12_bzip2", "unsupported-format", [] { return bytes("BZh91AY&SY") + ByteVector(400); }},
 };
 
-INSTANTIATE_TEST_SUITE_P(MaliciousInput, RefusedGzip, testing::ValuesIn(kBadGzips),
-                         [](const auto& row) { return row.param.name; });
+INSTANTIATE_TEST_SUITE_P(MaliciousInput, RefusedGzip, testing::ValuesIn(kBadGzips), test::name_of_row);
 
 struct GoodGzip {
   std::string name;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "algorithms/formats/nifti.h"
+#include "tests/support/bad_file.h"
 #include "tests/support/nifti_maker.h"
 #include "tests/support/peak_memory.h"
 #include "tests/support/temporary_file.h"
@@ -11,17 +12,12 @@
 namespace volsmooth {
 namespace {
 
+using test::BadFile;
 using test::ByteVector;
 using test::NiftiFile;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-struct BadFile {
-  std::string name;
-  std::string slug;
-  std::function<ByteVector()> make;
-};
 
 /// A good file with fields changed.
 BadFile bad_fields(const std::string& name, const std::string& slug,
@@ -255,21 +251,10 @@ std::vector<BadFile> nifti_rows() {
 class RefusedNifti : public testing::TestWithParam<BadFile> {};
 
 TEST_P(RefusedNifti, GetsItsSlugFromBothReaders) {
-  const test::TemporaryFile file(GetParam().make());
-  const auto inspected = inspect_nifti(file.path(), {});
-  ASSERT_FALSE(inspected.has_value());
-  EXPECT_EQ(inspected.error().slug, GetParam().slug) << inspected.error().detail;
-  EXPECT_FALSE(inspected.error().detail.empty());
-  const auto read = read_nifti(file.path(), {});
-  ASSERT_FALSE(read.has_value());
-  EXPECT_EQ(read.error().slug, GetParam().slug);
+  expect_refused(GetParam());
 }
 
-std::string name_of_row(const testing::TestParamInfo<BadFile>& row) {
-  return row.param.name;
-}
-
-INSTANTIATE_TEST_SUITE_P(MaliciousInput, RefusedNifti, testing::ValuesIn(nifti_rows()), name_of_row);
+INSTANTIATE_TEST_SUITE_P(MaliciousInput, RefusedNifti, testing::ValuesIn(nifti_rows()), test::name_of_row);
 
 TEST(RefusedNifti, AllocatesNothingForADeclaredSize) {
   const test::TemporaryFile file(bytes_of(NiftiFile{.size = {1200, 1200, 1200}, .datatype = 16}));
@@ -333,9 +318,14 @@ NiftiFile small_file(int version) {
   return file;
 }
 
+/// As it is, and compressed.
+std::vector<ByteVector> small_files(int version) {
+  const ByteVector plain = bytes_of(small_file(version));
+  return {plain, test::gzipped(plain)};
+}
+
 TEST_P(DamagedNifti, AnswersEveryTruncation) {
-  for (const ByteVector& whole :
-       {bytes_of(small_file(GetParam())), test::gzipped(bytes_of(small_file(GetParam())))}) {
+  for (const ByteVector& whole : small_files(GetParam())) {
     for (std::size_t length = 0; length < whole.size(); ++length) {
       const test::TemporaryFile file({whole.data(), length});
       EXPECT_FALSE(inspect_nifti(file.path(), {}).has_value()) << length;
@@ -344,13 +334,12 @@ TEST_P(DamagedNifti, AnswersEveryTruncation) {
 }
 
 TEST_P(DamagedNifti, AnswersEveryDamagedByte) {
-  for (const ByteVector& whole :
-       {bytes_of(small_file(GetParam())), test::gzipped(bytes_of(small_file(GetParam())))}) {
-    for (std::size_t at = 0; at < whole.size(); ++at) {
+  for (ByteVector damaged : small_files(GetParam())) {
+    for (std::byte& byte : damaged) {
       for (const auto change : {std::byte{0x01}, std::byte{0x80}, std::byte{0xff}}) {
-        ByteVector damaged = whole;
-        damaged[at] ^= change;
+        byte ^= change;
         expect_an_answer(damaged);
+        byte ^= change;
       }
     }
   }
