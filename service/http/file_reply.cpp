@@ -1,24 +1,15 @@
 #include "service/http/file_reply.h"
 
-#include <algorithm>
 #include <system_error>
 
 #include "service/http/accept.h"
-#include "service/http/ascii.h"
+#include "service/http/entity_tag.h"
 #include "service/http/range.h"
 
 namespace volsmooth {
 namespace {
 
 constexpr std::string_view kBoundary = "volsmooth-ranges-3f1c8a52e07b4d96";
-
-/// Whether a list of entity tags names ours; weak tags count, as If-None-Match compares weakly.
-bool names_tag(std::string_view list, std::string_view tag) {
-  return std::ranges::any_of(split(list, ','), [tag](std::string_view one) {
-    if (one.starts_with("W/")) one.remove_prefix(2);
-    return one == tag || one == "*";
-  });
-}
 
 std::string content_range(const ByteRange& range, std::int64_t size) {
   return "bytes " + std::to_string(range.first) + "-" + std::to_string(range.first + range.length - 1) + "/" +
@@ -52,7 +43,7 @@ Reply reply_with_file(const Request& request, const StoredFile& file) {
     return tl::unexpected(Problem{"not-acceptable", "It can only be sent as " + file.media_type + "."});
   const std::string tag = '"' + file.sha256 + '"';
   Response response{200, {{"ETag", tag}, {"Accept-Ranges", "bytes"}, {"Cache-Control", "private, no-cache"}}};
-  if (names_tag(request.head.header("if-none-match"), tag)) {
+  if (if_none_match_names(request.head, tag)) {
     response.status = 304;
     return response;
   }

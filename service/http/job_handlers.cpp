@@ -1,4 +1,5 @@
 #include "service/http/answers.h"
+#include "service/http/entity_tag.h"
 #include "service/http/file_reply.h"
 #include "service/http/handlers.h"
 #include "service/http/problem_types.h"
@@ -72,7 +73,6 @@ tl::expected<Job, Problem> submit_form(Api& api, Request& request) {
   return job;
 }
 
-/// RFC: https://html.spec.whatwg.org/multipage/server-sent-events.html#event-stream-interpretation
 /// What is kept of an event has the problem as the jobs know it.
 std::string data_of(const JobEvent& event) {
   if (event.kind != "state") return event.data;
@@ -81,6 +81,7 @@ std::string data_of(const JobEvent& event) {
   return data.dump();
 }
 
+/// RFC: https://html.spec.whatwg.org/multipage/server-sent-events.html#event-stream-interpretation
 std::string as_event(const JobEvent& event) {
   return "id: " + event.id + "\nevent: " + event.kind + "\ndata: " + data_of(event) + "\n\n";
 }
@@ -124,7 +125,11 @@ Reply get_jobs(Api& api, Request& request) {
 Reply get_job(Api& api, Request& request) {
   const std::string id = request.path["id"];
   const auto wait = number_in(request.query, "wait").value_or(0);
-  if (wait == 0) return api.jobs.job(id).map([](const Job& job) { return json_response(document_of(job)); });
+  if (wait == 0)
+    return api.jobs.job(id).map([&](const Job& job) {
+      const auto document = document_of(job);
+      return tagged_response(request, document, entity_tag(document.dump()));
+    });
 
   const auto ask = [&api, id] {
     return api.jobs.job(id).map([](const Job& job) {
@@ -151,7 +156,13 @@ Reply cancel_job(Api& api, Request& request) {
 }
 
 Reply delete_job(Api& api, Request& request) {
-  return api.jobs.delete_job(request.path["id"]).map([] { return Response{204}; });
+  const auto is_wanted = [&](const Job& job) {
+    return if_match_holds(request.head, entity_tag(document_of(job).dump()));
+  };
+  return api.jobs.delete_job(request.path["id"], is_wanted).and_then([](bool deleted) -> Reply {
+    if (!deleted) return tl::unexpected(has_changed());
+    return Response{204};
+  });
 }
 
 Reply get_results(Api& api, Request& request) {

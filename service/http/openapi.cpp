@@ -23,6 +23,10 @@ json schema_of(const QueryParameter& parameter) {
   return schema;
 }
 
+json header_parameter(std::string_view name, std::string_view description) {
+  return {{"name", name}, {"in", "header"}, {"description", description}, {"schema", {{"type", "string"}}}};
+}
+
 json parameters_of(const Route& route) {
   json parameters = json::array();
   for (const auto part : split(route.pattern, '/'))
@@ -36,6 +40,13 @@ json parameters_of(const Route& route) {
                           {"in", "query"},
                           {"description", parameter.description},
                           {"schema", schema_of(parameter)}});
+  if (route.body != BodyKind::kNone)
+    for (const auto name : {"Content-Digest", "Repr-Digest"})
+      parameters.push_back(
+          header_parameter(name, "RFC 9530; a body with another SHA-256 is refused: 422 digest-mismatch."));
+  if (route.method == "DELETE")
+    parameters.push_back(header_parameter(
+        "If-Match", "The ETag that GET gave; what has changed since stays: 412 precondition-failed."));
   return parameters;
 }
 
@@ -62,6 +73,7 @@ json responses_of(const Route& route) {
     if (!answer.schema.empty()) content["schema"] = reference(answer.schema);
     success["content"][std::string(answer.media_type)] = content;
   }
+  if (answer.tagged) success["headers"]["ETag"]["schema"]["type"] = "string";
   json problem = {{"description", "Why not."}};
   problem["content"]["application/problem+json"]["schema"] = reference("Problem");
   return {{std::to_string(answer.status), success}, {"default", problem}};

@@ -30,6 +30,7 @@ struct Answer {
   std::string_view media_type;  ///< empty: no body; "*/*": that of the file
   std::string_view schema;      ///< its name among the OpenAPI document's schemas, or empty
   std::string_view description;
+  bool tagged = false;  ///< whether it has an ETag
 };
 
 /// One call of the interface. Matching, validation of the query, Allow, the metrics' labels and the OpenAPI

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "service/http/accept.h"
+#include "service/http/digest_check.h"
 #include "service/http/metrics.h"
 #include "service/http/problem_types.h"
 
@@ -88,7 +89,10 @@ Session::Awaitable<void> Session::serve(Exchange& exchange) {
     co_return;
   }
   auto receiver = co_await run_guarded(context_.reading, exchange, [&] {
-    return receiver_for(exchange.route->body, exchange.request, context_.body_rules);
+    return receiver_for(exchange.route->body, exchange.request, context_.body_rules)
+        .and_then([&](std::unique_ptr<BodyReceiver> made) {
+          return with_digest_check(exchange.request.head, std::move(made));
+        });
   });
   if (receiver)
     co_await handle(exchange, std::move(*receiver));

@@ -1,5 +1,6 @@
 #include <chrono>
 
+#include "service/http/entity_tag.h"
 #include "service/http/problem_types.h"
 #include "service/http/session.h"
 
@@ -143,6 +144,7 @@ Session::Awaitable<Reply> Session::wait_for(Exchange& exchange, LongPoll& poll, 
               !connection_.peer_has_closed();
     if (waiting) co_await wake_->sleep_until(end);
   }
+  if (reply) reply->headers.push_back({"ETag", entity_tag(std::get<Document>(reply->body).bytes)});
   connection_.cancel();
   wake_.reset();
   co_return reply;

@@ -1,4 +1,5 @@
 #include "service/http/answers.h"
+#include "service/http/entity_tag.h"
 #include "service/http/file_reply.h"
 #include "service/http/handlers.h"
 #include "service/http/query_values.h"
@@ -33,8 +34,8 @@ Reply get_volumes(Api& api, Request&) {
 }
 
 Reply get_volume(Api& api, Request& request) {
-  return api.jobs.volume(request.path["id"]).map([](const StoredVolume& volume) {
-    return json_response(to_json(volume));
+  return api.jobs.volume(request.path["id"]).map([&](const StoredVolume& volume) {
+    return tagged_response(request, to_json(volume), entity_tag(volume));
   });
 }
 
@@ -45,6 +46,10 @@ Reply get_volume_content(Api& api, Request& request) {
 }
 
 Reply delete_volume(Api& api, Request& request) {
+  // A volume never changes, so nothing can come between the look and the step but its end.
+  if (const auto found = api.jobs.volume(request.path["id"]);
+      found && !if_match_holds(request.head, entity_tag(*found)))
+    return tl::unexpected(has_changed());
   return api.jobs.delete_volume(request.path["id"]).map([] { return Response{204}; });
 }
 

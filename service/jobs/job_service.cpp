@@ -177,14 +177,17 @@ tl::expected<Job, Problem> JobService::cancel(std::string_view id) {
   return state_->missing(id, "job");
 }
 
-tl::expected<void, Problem> JobService::delete_job(std::string_view id) {
-  const auto removed = state_->jobs.remove(id);
-  if (!removed) return state_->unless_gone(id, "job");
+tl::expected<bool, Problem> JobService::delete_job(std::string_view id,
+                                                   const std::function<bool(const Job&)>& is_wanted) {
+  const auto removed =
+      state_->jobs.remove(id, [&](const Job& job) { return is_wanted(state_->with_progress(job)); });
+  if (!removed) return state_->unless_gone(id, "job").map([] { return true; });
+  if (!removed->removed) return false;
   if (const auto running = state_->running.find(id)) running->interrupt(RunningJob::Interruption::kCancel);
   if (removed->job.state == JobState::kSucceeded) state_->files.remove(results_directory(removed->job));
   if (!removed->was_final) state_->tell_final(removed->job);
   state_->wakes.wake(removed->job.id);
-  return {};
+  return true;
 }
 
 tl::expected<StoredFile, Problem> JobService::result(std::string_view job_id, std::string_view name) {

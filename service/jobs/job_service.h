@@ -89,8 +89,11 @@ class JobService {
   tl::expected<Job, Problem> job(std::string_view id);
   tl::expected<JobPage, Problem> jobs(const JobQuery& query);
   tl::expected<Job, Problem> cancel(std::string_view id);  ///< repeatable; a final job stays as it is
-  tl::expected<void, Problem> delete_job(
-      std::string_view id);  ///< repeatable; a running one is cancelled first
+  /// Repeatable; a running one is cancelled first. False: it is there, but `is_wanted`, which sees it as it
+  /// is deleted, says no.
+  tl::expected<bool, Problem> delete_job(
+      std::string_view id,
+      const std::function<bool(const Job&)>& is_wanted = [](const Job&) { return true; });
   tl::expected<StoredFile, Problem> result(std::string_view job_id, std::string_view name);
 
   /// The events of a job after `last_event_id` (empty: all that are kept).

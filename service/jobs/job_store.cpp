@@ -200,11 +200,13 @@ bool JobStore::is_wanted(std::string_view id) {
   });
 }
 
-std::optional<JobStore::Removed> JobStore::remove(std::string_view id) {
-  return database_.write([&](Database& database) -> std::optional<Removed> {
+std::optional<JobStore::Removal> JobStore::remove(std::string_view id,
+                                                  const std::function<bool(const Job&)>& is_wanted) {
+  return database_.write([&](Database& database) -> std::optional<Removal> {
     std::optional<Job> job = find_in(database, id);
     if (!job) return std::nullopt;
     const bool was_final = is_final(job->state);
+    if (!is_wanted(*job)) return Removal{*std::move(job), was_final, false};
     if (!was_final) {
       change_in(database, {job->id, job->attempt, job->state, JobState::kCancelled, job->progress});
       job = find_in(database, id);
@@ -212,7 +214,7 @@ std::optional<JobStore::Removed> JobStore::remove(std::string_view id) {
     database.run("DELETE FROM jobs WHERE id = ?", id);
     bury(database, id);
     audit(database, id, "job deleted");
-    return Removed{*std::move(job), was_final};
+    return Removal{*std::move(job), was_final, true};
   });
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <set>
 #include <string>
@@ -51,12 +52,14 @@ class JobStore {
   bool request_cancel(std::string_view id);  ///< of a running job; false: it is not running
   bool is_wanted(std::string_view id);       ///< it is there, and nobody asked to cancel it
 
-  /// Takes the job out, an unfinished one by way of `cancelled`. Gives what it was, and what it is no more.
-  struct Removed {
-    Job job;
+  /// Takes the job out, an unfinished one by way of `cancelled`, provided that `is_wanted` agrees. None:
+  /// there is no such job.
+  struct Removal {
+    Job job;  ///< at the end
     bool was_final;
+    bool removed;
   };
-  std::optional<Removed> remove(std::string_view id);
+  std::optional<Removal> remove(std::string_view id, const std::function<bool(const Job&)>& is_wanted);
 
   struct Interrupted {
     Job job;

@@ -34,6 +34,56 @@ TEST_F(Calls, BadFileBecomesNoVolume) {
   EXPECT_TRUE(jobs_.volumes().empty());
 }
 
+// SHA-256 of "voxels", by coreutils' sha256sum.
+constexpr const char* kDigestOfVoxels = "sha-256=:ONETQueALcRgJH3OyVuUVVfwWhvMdKTbN/QtfiuLQ94=:";
+
+TEST_F(Calls, ABodyIsHeldToItsDigest) {
+  for (const std::string name : {"Content-Digest: ", "Repr-Digest: "}) {
+    EXPECT_EQ(ask("POST /v1/volumes", "voxels", name + kDigestOfVoxels + "\r\n").status, 201);
+    const auto refused = ask("POST /v1/volumes", "voxelS", name + kDigestOfVoxels + "\r\n");
+    EXPECT_EQ(refused.status, 422);
+    EXPECT_EQ(slug(refused), "digest-mismatch");
+  }
+  EXPECT_EQ(slug(ask("POST /v1/jobs", "{}",
+                     std::string(kJsonType) + "Content-Digest: " + kDigestOfVoxels + "\r\n")),
+            "digest-mismatch");
+  EXPECT_EQ(slug(ask("POST /v1/volumes", "voxels", "Content-Digest: sha-256=:AAAA:\r\n")), "bad-header");
+  EXPECT_EQ(jobs_.volumes().size(), 2);
+  server_->stop();  // the file goes after the answer
+  EXPECT_TRUE(std::filesystem::is_empty(directory_ / "tmp"));
+}
+
+TEST_F(Calls, OnlyWhatIfMatchNamesIsDeleted) {
+  const auto if_match = [](const std::string& tags) { return "If-Match: " + tags + "\r\n"; };
+  const auto volume = "/v1/volumes/" + upload();
+  const auto job = "/v1/jobs/" + finished_job(volume.substr(12));
+  for (const auto& path : {job, volume}) {
+    const auto tag = ask("GET " + path).field("etag");
+    ASSERT_EQ(tag.size(), 66) << path;
+    for (const std::string& stale :
+         {std::string("\"stale\""), "W/" + tag, tag.substr(0, 65), std::string()}) {
+      const auto refused = ask("DELETE " + path, "", if_match(stale));
+      EXPECT_EQ(refused.status, 412) << path << stale;
+      EXPECT_EQ(slug(refused), "precondition-failed");
+    }
+    EXPECT_EQ(ask("GET " + path, "", "If-None-Match: " + tag + "\r\n").status, 304);
+    EXPECT_EQ(ask("DELETE " + path, "", if_match("\"stale\", " + tag)).status, 204);
+    EXPECT_EQ(ask("DELETE " + path, "", if_match(tag)).status, 204);  // it is repeatable
+    EXPECT_EQ(ask("GET " + path).status, 410);
+  }
+  EXPECT_EQ(ask("DELETE /v1/volumes/" + upload(), "", if_match("*")).status, 204);
+}
+
+TEST_F(Calls, TheTagOfAJobIsItsDocuments) {
+  const auto id = id_of(submit(upload(), "gate"));
+  const auto early = ask("GET /v1/jobs/" + id).field("etag");
+  engine_.open_gate();
+  const auto waited = ask("GET /v1/jobs/" + id + "?wait=60").field("etag");
+  EXPECT_EQ(slug(ask("DELETE /v1/jobs/" + id, "", "If-Match: " + early + "\r\n")), "precondition-failed");
+  EXPECT_EQ(ask("GET /v1/jobs/" + id).field("etag"), waited);
+  EXPECT_EQ(ask("DELETE /v1/jobs/" + id, "", "If-Match: " + waited + "\r\n").status, 204);
+}
+
 TEST_F(Calls, LargeUploadComesBackAsItWas) {
   std::string bytes;
   for (std::uint32_t i = 0; bytes.size() < 3'000'000; ++i) bytes += static_cast<char>(i * 2654435761U >> 24);
@@ -76,6 +126,15 @@ TEST_F(Calls, FailedJobHasAWholeProblem) {
   EXPECT_EQ(error.at("member"), "x");
 }
 
+TEST_F(Calls, AProblemIsTheSameDocumentInEventsAndJobs) {
+  const auto id = id_of(submit(upload(), "problem"));
+  const auto error = json::parse(ask("GET /v1/jobs/" + id + "?wait=60").body).at("error");
+  const auto events = ask("GET /v1/jobs/" + id + "/events").body;
+  const auto last = events.substr(events.rfind("data: ") + 6);
+  EXPECT_EQ(json::parse(last).at("error"), error);
+  EXPECT_EQ(json::parse(ask("GET /v1/jobs").body).at("jobs").at(0).at("error"), error);
+}
+
 TEST_F(Calls, VolumeInUseStays) {
   const auto volume = upload();
   const auto job = id_of(submit(volume, "gate"));
@@ -107,6 +166,20 @@ TEST_F(Calls, ManyThatWaitKeepNobodyWaiting) {
   EXPECT_EQ(ask("GET /v1/jobs/" + id).status, 200);
   engine_.open_gate();
   for (auto& client : waiting) EXPECT_EQ(json::parse(client->receive().body).at("state"), "succeeded");
+}
+
+TEST_F(Calls, ManyThatSubmitKeepNobodyWaitingWhoLooks) {
+  const auto volume = upload();
+  std::vector<std::unique_ptr<HttpClient>> submitting;
+  for (int i = 0; i < 10; ++i) {
+    const std::string order = R"({"volume": ")" + volume + R"(", "label": "plan at gate"})";
+    submitting.push_back(std::make_unique<HttpClient>(server_->address()));
+    submitting.back()->send(request("POST /v1/jobs", order, kJsonType));
+  }
+  while (engine_.at_gate == 0) std::this_thread::yield();
+  EXPECT_EQ(ask("GET /v1/volumes/" + volume).status, 200);
+  engine_.open_gate();
+  for (auto& client : submitting) EXPECT_EQ(client->receive().status, 202);
 }
 
 TEST_F(Calls, ListIsPagedAndFiltered) {
@@ -304,6 +377,17 @@ TEST_F(Calls, StopEndsWhatWaitsAndFinishesWhatIsUnderWay) {
   EXPECT_EQ(waiting.receive().status, 200);
   EXPECT_NO_THROW(watching.receive_until("0\r\n\r\n"));
   EXPECT_THROW(connect(), std::runtime_error);
+}
+
+TEST_F(Calls, StopTurnsAnUploadAwayThatIsBeingVerified) {
+  auto uploading = connect();
+  uploading.send(request("POST /v1/volumes", "gate stays shut"));
+  while (engine_.at_gate == 0) std::this_thread::yield();
+  jobs_.stop();
+  const auto answer = uploading.receive();
+  EXPECT_EQ(answer.status, 503);
+  EXPECT_EQ(slug(answer), "not-ready");
+  EXPECT_EQ(answer.field("retry-after"), "5");
 }
 
 TEST_F(Calls, HeadAnswersAsGetWithoutTheBody) {

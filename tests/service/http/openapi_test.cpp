@@ -61,6 +61,25 @@ TEST(OpenApi, LimitsOfTheQueryAreThoseOfTheValidation) {
   EXPECT_EQ(parameters[1].at("schema").at("maximum"), 300);
 }
 
+std::set<std::string> headers_of(const json& parameters) {
+  std::set<std::string> names;
+  for (const auto& parameter : parameters)
+    if (parameter.at("in") == "header") names.insert(parameter.at("name"));
+  return names;
+}
+
+TEST(OpenApi, DigestsAndPreconditionsAreDeclaredWhereTheyCount) {
+  for (const auto& route : routes()) {
+    std::string method(route.method);
+    std::ranges::transform(method, method.begin(), [](char c) { return static_cast<char>(std::tolower(c)); });
+    const auto headers =
+        headers_of(document().at("paths").at(std::string(route.pattern)).at(method).at("parameters"));
+    EXPECT_EQ(headers.contains("Content-Digest"), route.body != BodyKind::kNone) << route.pattern;
+    EXPECT_EQ(headers.contains("Repr-Digest"), route.body != BodyKind::kNone) << route.pattern;
+    EXPECT_EQ(headers.contains("If-Match"), route.method == "DELETE") << route.pattern;
+  }
+}
+
 TEST(OpenApi, NamesTheMethodsOnOffer) {
   EXPECT_EQ(document().at("/components/schemas/JobOrder/properties/method/enum"_json_pointer),
             json({"laplacian"}));

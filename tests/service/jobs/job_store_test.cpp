@@ -191,7 +191,7 @@ TEST_F(JobStoreTest, BehavesLikeItsModel) {
       ASSERT_EQ(jobs_.request_cancel(id), running);
       expected.cancel |= running;
     } else if (kind == 3 && random() % 4 == 0) {
-      ASSERT_TRUE(jobs_.remove(id));
+      ASSERT_TRUE(jobs_.remove(id, [](const Job&) { return true; }));
       ASSERT_FALSE(jobs_.find(id));
       std::erase(order, id);
     } else {
