@@ -18,8 +18,8 @@ std::vector<double> densities() {
   return {values.begin(), values.end()};
 }
 
-/// Neither smooth nor free of divergence; 0 on the border.
-FaceVelocities<double> noisy_velocities() {
+/// Neither smooth nor free of divergence.
+FaceVelocities<double> noisy_velocities(bool crosses_border = false) {
   FaceVelocities<double> velocities(kBox.size);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const Size3 counts = velocities.counts[axis];
@@ -27,7 +27,7 @@ FaceVelocities<double> noisy_velocities() {
     std::size_t face = 0;
     for_each_voxel({counts, {1, 1, 1}}, [&](const Size3& index, const Vector3&) {
       const bool is_border = index[axis] == 0 || index[axis] == kBox.size[axis];
-      velocities.at(axis, index) = is_border ? 0 : double{values[face]};
+      velocities.at(axis, index) = is_border && !crosses_border ? 0 : double{values[face]};
       ++face;
     });
   }
@@ -57,12 +57,14 @@ double draining(const FaceVelocities<double>& velocities, double times = 1) {
 }
 
 TEST(TransferThroughFaces, IsThePiecewiseConstantStepWhileNoCellDrains) {
-  const auto velocities = noisy_velocities();
-  const double step = draining(velocities, 0.99);
-  auto transferred = densities(), advected = transferred;
-  transfer_through_faces<double>(transferred, kBox, velocities, step);
-  advect<double>(advected, kBox, velocities, step, Reconstruction::kPiecewiseConstant);
-  for (std::size_t i = 0; i < advected.size(); ++i) ASSERT_NEAR(transferred[i], advected[i], 1e-14);
+  for (const bool crosses_border : {false, true}) {
+    const auto velocities = noisy_velocities(crosses_border);
+    const double step = draining(velocities, 0.99);
+    auto transferred = densities(), advected = transferred;
+    transfer_through_faces<double>(transferred, kBox, velocities, step);
+    advect<double>(advected, kBox, velocities, step, Reconstruction::kPiecewiseConstant);
+    for (std::size_t i = 0; i < advected.size(); ++i) ASSERT_NEAR(transferred[i], advected[i], 1e-14);
+  }
 }
 
 TEST(TransferThroughFaces, KeepsMassAndSignInAnyFieldAtAnyStep) {
