@@ -34,7 +34,7 @@ double number(const ParameterValues& values, const std::string& name, double oth
 }
 
 ParameterValues resolve_strength(const ParameterValues& asked, const Grid& grid) {
-  const double default_radius = 2 * std::cbrt(voxel_volume_mm3(grid.spacing_mm));
+  const double default_radius = 2 * std::cbrt(voxel_volume_mm3(grid));
   const double radius = number(asked, "feature_radius_mm", default_radius);
   const double flow_time = number(asked, "flow_time_mm2", radius * radius / 4);
   return {{"flow_time_mm2", flow_time}, {"feature_radius_mm", 2 * std::sqrt(flow_time)}};
@@ -50,7 +50,7 @@ Method flow_method(std::string name, std::string description) {
               [](const ParameterValues& asked, const Grid& grid) {
                 ParameterValues resolved = resolve_strength(asked, grid);
                 const StepPlan steps =
-                    plan(Flow{.flow_time_mm2 = std::get<double>(resolved["flow_time_mm2"])}, grid.spacing_mm);
+                    plan(Flow{.flow_time_mm2 = std::get<double>(resolved["flow_time_mm2"])}, grid);
                 resolved["step_mm2"] = steps.step_mm2;
                 resolved["steps"] = static_cast<double>(steps.steps);
                 return resolved;

@@ -19,4 +19,20 @@ const std::vector<InstructionSet>& instruction_sets();
 #define VOLSMOOTH_AVX512
 #endif
 
+/// Defines `NAME##_for(set)`: the always inlined `void NAME(const ROW&)`, compiled for an instruction set.
+#define VOLSMOOTH_ROW_KERNEL(NAME, ROW)                                  \
+  void NAME##_baseline(const ROW& row) {                                 \
+    NAME(row);                                                           \
+  }                                                                      \
+  VOLSMOOTH_AVX2 void NAME##_avx2(const ROW& row) {                      \
+    NAME(row);                                                           \
+  }                                                                      \
+  VOLSMOOTH_AVX512 void NAME##_avx512(const ROW& row) {                  \
+    NAME(row);                                                           \
+  }                                                                      \
+  void (*NAME##_for(InstructionSet set))(const ROW&) {                   \
+    if (set == InstructionSet::kAvx512) return NAME##_avx512;            \
+    return set == InstructionSet::kAvx2 ? NAME##_avx2 : NAME##_baseline; \
+  }
+
 }  // namespace volsmooth

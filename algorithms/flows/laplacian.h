@@ -12,7 +12,7 @@ struct Laplacian {
   double flow_time_mm2 = 1.0;
 };
 
-StepPlan plan(const Laplacian& flow, const Vector3& spacing_mm);
+StepPlan plan(const Laplacian& flow, const Grid& grid);
 
 /// As `smooth(Volume&, const MeanCurvatureFlow&)`; mass is kept to rounding.
 void smooth(Volume& volume, const Laplacian& flow, const Progress& report = no_progress);

@@ -6,14 +6,21 @@
 
 namespace volsmooth {
 
+/// How kappa and |grad rho| are discretised (README.md compares them).
+enum class MeanCurvatureScheme {
+  kFaceCentred,  ///< the unit normal's flux through a voxel's faces: second order
+  kThesis,       ///< thesis, Eqs. 6.2 to 6.6, with piecewise constant gains: first order. Right angles only
+};
+
 /// d rho / dt = -dA/drho |grad rho|: every isosurface moves along its normal by its mean curvature
 /// kappa = kappa1 + kappa2 (thesis, Eq. 5.5 with L = area, section 6.2). Reflecting border.
 struct MeanCurvatureFlow {
   double flow_time_mm2 = 1.0;  ///< a ball of radius R shrinks to sqrt(R^2 - 4 flow_time)
+  MeanCurvatureScheme scheme = MeanCurvatureScheme::kFaceCentred;
 };
 
 /// The stable steps `smooth` takes (README.md, "Stability").
-StepPlan plan(const MeanCurvatureFlow& flow, const Vector3& spacing_mm);
+StepPlan plan(const MeanCurvatureFlow& flow, const Grid& grid);
 
 /// Lets all isosurfaces of `volume` flow, on all cores of the current arena. No value leaves the input's
 /// range; the result does not depend on the number of threads. The volume's buffer may be another one

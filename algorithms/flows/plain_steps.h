@@ -2,8 +2,10 @@
 
 #include <span>
 
+#include "algorithms/flows/grid_metric.h"
 #include "algorithms/numerics/curvature.h"
 #include "algorithms/numerics/diffusion.h"
+#include "algorithms/numerics/face_centred.h"
 #include "algorithms/numerics/godunov.h"
 #include "algorithms/numerics/reflection.h"
 #include "algorithms/volume/geometry.h"
@@ -65,6 +67,22 @@ void plain_mean_curvature_step(std::span<const Scalar> from, std::span<Scalar> t
       normal.after[e] = unit_normal(rho.neighbours(rho.shifted(i, e, 1)), step.inverse_spacing)[e];
     }
     return moved(curvature(normal, step.inverse_spacing), rho(i), rho.neighbours(i), step);
+  });
+}
+
+/// rho_i + dt kappa |grad rho|, face-centred, on any axes.
+template <class Scalar>
+void plain_face_centred_step(std::span<const Scalar> from, std::span<Scalar> to, const Grid& grid,
+                             double step_mm2) {
+  const MirroredField<Scalar> rho{from, grid.size};
+  const auto time = scaled_time<Scalar>(grid, step_mm2);
+  with_metric<Scalar>(grid, [&](const auto& metric) {
+    fill_voxels(to, grid.size, [&](const Size3& i) {
+      const auto around = [&](const VoxelOffset& at) {
+        return rho({i[0] + at[0], i[1] + at[1], i[2] + at[2]});
+      };
+      return face_centred_moved<Scalar>(around, metric, time);
+    });
   });
 }
 

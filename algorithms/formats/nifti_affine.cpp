@@ -170,7 +170,8 @@ std::optional<Refusal> check_orientation(const NiftiFields& fields) {
   }
   if (fields.sform_code > 0) {
     const VoxelToWorld map = sform_map(fields);
-    const double box = voxel_volume_mm3(spacing_of(map));
+    const Vector3 sides = spacing_of(map);
+    const double box = sides[0] * sides[1] * sides[2];
     if (!(box > 0) || !(std::abs(determinant(map.linear)) >= kLeastDeterminant * box)) {
       return bad("The sform's matrix cannot be inverted.");
     }

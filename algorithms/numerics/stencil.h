@@ -2,12 +2,27 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
+#include <type_traits>
 
 namespace volsmooth {
 
 /// Formulas on stencils are marked with this: the row kernels need them inlined to vectorise them, and for
 /// every instruction set anew.
 #define VOLSMOOTH_FORMULA [[gnu::always_inline]] inline
+
+/// The same for a lambda, between its parameters and its body.
+#define VOLSMOOTH_INLINE __attribute__((always_inline))
+
+/// Calls `body(0)`, `body(1)`, ... with constants: loops inside loops, which GCC does not unroll early enough
+/// to vectorise the one over voxels around them.
+template <std::size_t kCount, class Body>
+VOLSMOOTH_FORMULA void unrolled(const Body& body) {
+  if constexpr (kCount > 0) {
+    unrolled<kCount - 1>(body);
+    body(std::integral_constant<std::size_t, kCount - 1>{});
+  }
+}
 
 /// The six neighbours of a voxel: [axis].
 template <class Scalar>

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "algorithms/numerics/metric.h"
 #include "algorithms/numerics/reflection.h"
 #include "algorithms/volume/parallel.h"
 
@@ -21,7 +22,8 @@ struct Rows {
 };
 
 /// The sums of row (y, z): intensities, and lengths of the gradient.
-FoliationMeasures measure_row(const Rows& rows, const Vector3& per_mm, std::int64_t y, std::int64_t z) {
+FoliationMeasures measure_row(const Rows& rows, const AnyMetric<double>& metric, std::int64_t y,
+                              std::int64_t z) {
   const float* here = rows(y, z);
   const float *south = rows(y - 1, z), *north = rows(y + 1, z);
   const float *below = rows(y, z - 1), *above = rows(y, z + 1);
@@ -29,10 +31,9 @@ FoliationMeasures measure_row(const Rows& rows, const Vector3& per_mm, std::int6
   FoliationMeasures sums{.minimum = here[0], .maximum = here[0]};
   for (std::int64_t x = 0; x <= last; ++x) {
     const float left = here[x > 0 ? x - 1 : 0], right = here[x < last ? x + 1 : last];
-    const double dx = (double{right} - left) * per_mm[0];
-    const double dy = (double{north[x]} - south[x]) * per_mm[1];
-    const double dz = (double{above[x]} - below[x]) * per_mm[2];
-    sums.area += std::sqrt(dx * dx + dy * dy + dz * dz);
+    const auto gradient = metric.gradient({0.5 * (double{right} - left), 0.5 * (double{north[x]} - south[x]),
+                                           0.5 * (double{above[x]} - below[x])});
+    sums.area += std::sqrt(square_of(gradient));
     sums.mass += double{here[x]};
     sums.minimum = std::min(sums.minimum, here[x]);
     sums.maximum = std::max(sums.maximum, here[x]);
@@ -52,8 +53,7 @@ void add(FoliationMeasures& sums, const FoliationMeasures& more) {
 FoliationMeasures measure(const Volume& volume, const Progress& report) {
   const Grid grid = grid_of(volume);
   const Rows rows{volume.GetBufferPointer(), grid.size};
-  Vector3 per_mm;
-  for (std::size_t axis = 0; axis < 3; ++axis) per_mm[axis] = 0.5 / grid.spacing_mm[axis];
+  const AnyMetric<double> metric(metric_of(grid));
 
   const std::int64_t row_count = grid.size[1] * grid.size[2];
   constexpr std::int64_t kVoxelsOfChunk = 1 << 18;
@@ -66,14 +66,14 @@ FoliationMeasures measure(const Volume& volume, const Progress& report) {
       [&](std::int64_t begin, std::int64_t end) {
         FoliationMeasures& chunk = chunks[static_cast<std::size_t>(begin / rows_of_chunk)];
         for (std::int64_t row = begin; row < end; ++row)
-          add(chunk, measure_row(rows, per_mm, row % grid.size[1], row / grid.size[1]));
+          add(chunk, measure_row(rows, metric, row % grid.size[1], row / grid.size[1]));
       },
       report);
 
   FoliationMeasures total = none;
   for (const FoliationMeasures& chunk : chunks) add(total, chunk);
-  total.mass *= voxel_volume_mm3(grid.spacing_mm);
-  total.area *= voxel_volume_mm3(grid.spacing_mm);
+  total.mass *= voxel_volume_mm3(grid);
+  total.area *= voxel_volume_mm3(grid);
   return total;
 }
 

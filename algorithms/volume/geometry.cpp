@@ -1,6 +1,8 @@
 #include "algorithms/volume/geometry.h"
 
+#include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace volsmooth {
 namespace {
@@ -54,6 +56,23 @@ Matrix3 inverse(const Matrix3& m) {
   return result;
 }
 
+double sum_of_larger_eigenvalues(const Matrix3& m) {
+  // With mean q and p^2 = |m - q|^2 / 6 the eigenvalues of (m - q)/p are 2 cos(angle), 3 angle = acos(det/2).
+  const double mean = (m[0][0] + m[1][1] + m[2][2]) / 3;
+  Matrix3 rest = m;
+  double squares = 0;
+  for (std::size_t row = 0; row < 3; ++row) {
+    rest[row][row] -= mean;
+    squares += dot(rest[row], rest[row]);
+  }
+  const double p = std::sqrt(squares / 6);
+  if (p == 0) return 2 * mean;
+  const double half_determinant = std::clamp(determinant(rest) / (p * p * p) / 2, -1.0, 1.0);
+  constexpr double kThirdOfTurn = 2 * std::numbers::pi / 3;
+  const double least = mean + 2 * p * std::cos(std::acos(half_determinant) / 3 + kThirdOfTurn);
+  return 3 * mean - least;
+}
+
 Vector3 spacing_of(const VoxelToWorld& map) {
   Vector3 spacing;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -63,24 +82,39 @@ Vector3 spacing_of(const VoxelToWorld& map) {
   return spacing;
 }
 
-bool is_orthogonal(const VoxelToWorld& map) {
-  constexpr double kLargestCosine = 1e-4;
-  const Vector3 spacing = spacing_of(map);
+Grid grid_of(const Size3& size, const VoxelToWorld& map) {
+  constexpr double kRightAngle = 1e-4;
+  Grid grid{.size = size, .spacing_mm = spacing_of(map)};
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const std::size_t next = (axis + 1) % 3;
+    const std::size_t a = (axis + 1) % 3, b = (axis + 2) % 3;
     const double cosine =
-        dot(column(map.linear, axis), column(map.linear, next)) / (spacing[axis] * spacing[next]);
-    if (std::abs(cosine) > kLargestCosine) return false;
+        dot(column(map.linear, a), column(map.linear, b)) / (grid.spacing_mm[a] * grid.spacing_mm[b]);
+    if (std::abs(cosine) > kRightAngle) grid.cosines[axis] = cosine;
   }
-  return true;
+  return grid;
+}
+
+bool is_orthogonal(const Grid& grid) {
+  return grid.cosines == Vector3{0, 0, 0};
+}
+
+Matrix3 metric_of(const Grid& grid) {
+  const Vector3& h = grid.spacing_mm;
+  Matrix3 metric;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::size_t a = (axis + 1) % 3, b = (axis + 2) % 3;
+    metric[axis][axis] = h[axis] * h[axis];
+    metric[a][b] = metric[b][a] = h[a] * h[b] * grid.cosines[axis];
+  }
+  return metric;
 }
 
 std::int64_t voxel_count(const Size3& size) {
   return size[0] * size[1] * size[2];
 }
 
-double voxel_volume_mm3(const Vector3& spacing_mm) {
-  return spacing_mm[0] * spacing_mm[1] * spacing_mm[2];
+double voxel_volume_mm3(const Grid& grid) {
+  return std::sqrt(determinant(metric_of(grid)));
 }
 
 }  // namespace volsmooth

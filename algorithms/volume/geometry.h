@@ -28,19 +28,28 @@ Vector3 to_world(const VoxelToWorld& map, const Vector3& index);
 double determinant(const Matrix3& matrix);
 Matrix3 inverse(const Matrix3& matrix);  ///< of an invertible matrix
 
+/// All of a symmetric matrix' three eigenvalues but the least, added up.
+double sum_of_larger_eigenvalues(const Matrix3& symmetric);
+
 /// Lengths of the matrix' columns: the distance in mm between neighbouring voxel centres along each axis.
 Vector3 spacing_of(const VoxelToWorld& map);
 
-/// Whether the three axes meet at right angles: every cosine between two of them is at most 1e-4 in size.
-bool is_orthogonal(const VoxelToWorld& map);
-
-/// What a flow needs to know of a grid with orthogonal axes.
+/// What a flow needs to know of a grid: lengths and angles, not where it lies.
 struct Grid {
   Size3 size{};
-  Vector3 spacing_mm{1, 1, 1};
+  Vector3 spacing_mm{1, 1, 1};  ///< between neighbouring voxel centres along each axis
+  Vector3 cosines{0, 0, 0};     ///< of the angles between axes 1 and 2, 2 and 0, 0 and 1
 };
 
+/// Cosines of at most 1e-4, which headers come to by rounding, count as right angles and become 0.
+Grid grid_of(const Size3& size, const VoxelToWorld& map);
+
+bool is_orthogonal(const Grid& grid);  ///< whether the three axes meet at right angles
+
+/// G with G_ef = a_e . a_f for the steps a from voxel to voxel: a way of d voxels is sqrt(d^T G d) mm long.
+Matrix3 metric_of(const Grid& grid);
+
 std::int64_t voxel_count(const Size3& size);
-double voxel_volume_mm3(const Vector3& spacing_mm);
+double voxel_volume_mm3(const Grid& grid);
 
 }  // namespace volsmooth

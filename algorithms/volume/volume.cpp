@@ -1,6 +1,7 @@
 #include "algorithms/volume/volume.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "algorithms/volume/parallel.h"
 
@@ -25,17 +26,29 @@ Volume::Pointer make_volume(const Size3& size, const VoxelToWorld& map) {
 }
 
 Volume::Pointer make_volume(const Grid& grid) {
-  VoxelToWorld map{.frame = Frame::kLps};
-  for (std::size_t axis = 0; axis < 3; ++axis) map.linear[axis][axis] = grid.spacing_mm[axis];
+  // The columns of R in G = R^T R are steps of the grid's lengths and angles.
+  const Matrix3 metric = metric_of(grid);
+  VoxelToWorld map{.linear = {}, .frame = Frame::kLps};
+  for (std::size_t col = 0; col < 3; ++col) {
+    for (std::size_t row = 0; row <= col; ++row) {
+      double rest = metric[row][col];
+      for (std::size_t k = 0; k < row; ++k) rest -= map.linear[k][row] * map.linear[k][col];
+      map.linear[row][col] = row < col ? rest / map.linear[row][row] : std::sqrt(rest);
+    }
+  }
   return make_volume(grid.size, map);
 }
 
 Grid grid_of(const Volume& volume) {
-  Grid grid;
+  Size3 size;
+  VoxelToWorld map{.frame = Frame::kLps};
   for (unsigned axis = 0; axis < 3; ++axis) {
-    grid.size[axis] = static_cast<std::int64_t>(volume.GetBufferedRegion().GetSize(axis));
-    grid.spacing_mm[axis] = volume.GetSpacing()[axis];
+    size[axis] = static_cast<std::int64_t>(volume.GetBufferedRegion().GetSize(axis));
+    for (unsigned row = 0; row < 3; ++row)
+      map.linear[row][axis] = volume.GetDirection()(row, axis) * volume.GetSpacing()[axis];
   }
+  Grid grid = grid_of(size, map);
+  for (unsigned axis = 0; axis < 3; ++axis) grid.spacing_mm[axis] = volume.GetSpacing()[axis];  // to the bit
   return grid;
 }
 

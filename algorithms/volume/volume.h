@@ -16,7 +16,8 @@ using Volume = itk::Image<float, 3>;
 /// An allocated, uninitialised volume on the grid that `map` places in the world.
 Volume::Pointer make_volume(const Size3& size, const VoxelToWorld& map);
 
-/// An allocated, uninitialised volume with axes along the world's and voxel (0,0,0) at the origin.
+/// An allocated, uninitialised volume with voxel (0,0,0) at the origin, its first axis along the world's x
+/// and its second in the plane of x and y.
 Volume::Pointer make_volume(const Grid& grid);
 
 Grid grid_of(const Volume& volume);

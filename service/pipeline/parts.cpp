@@ -4,6 +4,15 @@
 
 namespace volsmooth {
 
+Grid grid_of(const VolumeFacts& volume) {
+  VoxelToWorld map;
+  for (std::size_t row = 0; row < 3; ++row)
+    for (std::size_t column = 0; column < 3; ++column) map.linear[row][column] = volume.affine[row][column];
+  Grid grid = grid_of(volume.size, map);
+  grid.spacing_mm = volume.spacing_mm;
+  return grid;
+}
+
 const Method& method_called(const std::string& name) {
   const Method* method = find_method(name);
   if (method == nullptr) throw std::logic_error("a method that is not in the catalogue");

@@ -13,6 +13,9 @@ struct Part {
   ParameterValues parameters;
 };
 
+/// The grid of a stored volume, angles included.
+Grid grid_of(const VolumeFacts& volume);
+
 /// The row of the catalogue called `name`. Throws std::logic_error: an order was checked long before.
 const Method& method_called(const std::string& name);
 

@@ -39,7 +39,7 @@ tl::expected<JobPlan, Problem> plan_job(const JobOrder& order, const VolumeFacts
                                         const PipelineLimits& limits) {
   if (const auto checked = check_isovalues(order, volume); !checked) return tl::unexpected(checked.error());
 
-  const Grid grid{volume.size, volume.spacing_mm};
+  const Grid grid = grid_of(volume);
   const auto voxels = static_cast<double>(voxel_count(grid.size));
   JobPlan plan;
   plan.parameters = method_called(order.method).resolve(order.parameters, grid);

@@ -37,7 +37,7 @@ class JobRun {
  public:
   JobRun(const ComputeTask& task, const StageProgress& report, const PipelineLimits& limits)
       : task_(task),
-        parts_(parts_of(task.order, task.parameters, {task.volume.facts.size, task.volume.facts.spacing_mm})),
+        parts_(parts_of(task.order, task.parameters, grid_of(task.volume.facts))),
         limits_(limits),
         surface_bytes_(limits.max_memory_bytes / 4),
         voxels_(static_cast<double>(voxel_count(task.volume.facts.size))),

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "algorithms/flows/face_centred_sweep.h"
 #include "algorithms/flows/laplacian_sweep.h"
 #include "algorithms/flows/mean_curvature_sweep.h"
 #include "algorithms/flows/plain_steps.h"
@@ -21,6 +22,7 @@ struct Flow {
 };
 
 const Flow kFlows[] = {{"MeanCurvature", plain_mean_curvature_step<float>, mean_curvature_step},
+                       {"FaceCentred", plain_face_centred_step<float>, face_centred_step},
                        {"Laplacian", plain_laplacian_step<float>, laplacian_step}};
 
 struct Case {
@@ -44,9 +46,13 @@ std::vector<Case> cases() {
       {{{257, 3, 2}, {900, 900, 1000}}, whole}, {{{1, 1, 29}, {1, 1, 1}}, small},
       {{{29, 1, 1}, {1, 1, 1}}, whole},         {{{15, 31, 31}, {1, 1, 1.5}}, {8, 5}},
   };
+  const std::pair<Grid, TileShape> skew_grids[] = {{{{17, 13, 11}, {1, 1, 1}, {0.1, -0.3, 0.5}}, whole},
+                                                   {{{17, 5, 6}, {1, 1, 5}, {0, 0.34, 0}}, small},
+                                                   {{{1, 4, 3}, {1, 2, 3}, {0.2, 0.2, 0.2}}, single}};
   std::vector<Case> all;
   for (const Flow& flow : kFlows)
     for (const auto& [grid, tile] : grids) all.push_back({flow, grid, tile});
+  for (const auto& [grid, tile] : skew_grids) all.push_back({kFlows[1], grid, tile});
   return all;
 }
 

@@ -61,7 +61,7 @@ TEST(Laplacian, DampsACosineByTheFactorOfTheStencil) {
   for_each_voxel(grid, [&](const Size3& i, const Vector3&) {
     cosine.push_back(static_cast<float>(std::cos(wave * (static_cast<double>(i[0]) + 0.5))));
   });
-  const StepPlan steps = plan(Laplacian{5}, grid.spacing_mm);
+  const StepPlan steps = plan(Laplacian{5}, grid);
   const double factor = std::pow(1 - steps.step_mm2 * (2 - 2 * std::cos(wave)) / (1.5 * 1.5), steps.steps);
   const auto out = smoothed(grid, cosine, 5);
   for (std::size_t voxel = 0; voxel < out.size(); ++voxel)
@@ -73,7 +73,7 @@ TEST(Laplacian, DampsACosineByTheFactorOfTheStencil) {
 TEST(Laplacian, KeepsMassToRounding) {
   const Grid grid{{31, 29, 23}, {1, 1, 2.5}};
   const auto before = noise(grid.size, 2, 0, 1000);
-  const double steps = static_cast<double>(plan(Laplacian{10}, grid.spacing_mm).steps);
+  const double steps = static_cast<double>(plan(Laplacian{10}, grid).steps);
   const double roundings = steps * static_cast<double>(before.size());
   EXPECT_NEAR(sum_of(smoothed(grid, before, 10)), sum_of(before), 6 * std::sqrt(roundings) * 0x1p-14);
 }

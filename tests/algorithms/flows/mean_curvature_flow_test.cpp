@@ -11,7 +11,7 @@ namespace {
 
 std::vector<float> smoothed(const Grid& grid, const std::vector<float>& values, double flow_time_mm2) {
   auto volume = volume_of(grid, values);
-  smooth(*volume, MeanCurvatureFlow{flow_time_mm2});
+  smooth(*volume, MeanCurvatureFlow{flow_time_mm2, MeanCurvatureScheme::kThesis});
   return values_of(*volume);
 }
 
@@ -87,7 +87,7 @@ double fast_error(const Vector3& spacing) {
 
 double plain_error(const Vector3& spacing) {
   return error_with_spacing<double>(spacing, [](std::vector<double>& values, const Grid& grid, double time) {
-    const StepPlan steps = plan(MeanCurvatureFlow{time}, grid.spacing_mm);
+    const StepPlan steps = plan(MeanCurvatureFlow{time, MeanCurvatureScheme::kThesis}, grid);
     std::vector<double> next(values.size());
     for (std::int64_t step = 0; step < steps.steps; ++step) {
       plain_mean_curvature_step<double>(values, next, grid, steps.step_mm2);
@@ -153,7 +153,7 @@ bool is_inside(const Size3& index, const Size3& size, std::int64_t steps) {
 }
 
 double largest_move_inside(const Grid& grid, const std::vector<float>& before, std::int64_t steps) {
-  const double step = plan(MeanCurvatureFlow{1e6}, grid.spacing_mm).step_mm2;
+  const double step = plan(MeanCurvatureFlow{1e6, MeanCurvatureScheme::kThesis}, grid).step_mm2;
   const auto after = smoothed(grid, before, static_cast<double>(steps) * step);
   double largest = 0;
   std::size_t voxel = 0;
@@ -201,7 +201,7 @@ TEST(MeanCurvatureFlow, MovesObliquePlanesByAnErrorOfFourthOrder) {
     const auto planes = sampled<double>(grid, [&](const Vector3& x) {
       return std::atan((2 * (x[0] - centre[0]) + (x[1] - centre[1]) - (x[2] - centre[2])) / 20);
     });
-    const double step = plan(MeanCurvatureFlow{1e6}, grid.spacing_mm).step_mm2;
+    const double step = plan(MeanCurvatureFlow{1e6, MeanCurvatureScheme::kThesis}, grid).step_mm2;
     auto after = planes;
     plain_mean_curvature_step<double>(planes, after, grid, step);
     double largest = 0;
@@ -252,7 +252,7 @@ std::vector<float> wild_noise(const Size3& size, unsigned seed) {
 TEST(MeanCurvatureFlow, NeverLeavesTheNeighboursRangeOnNoise) {
   for (unsigned seed = 0; seed < 100; ++seed) {
     const Grid grid{{12, 11, 10}, kSpacings[seed % std::size(kSpacings)]};
-    const double step = plan(MeanCurvatureFlow{1e15}, grid.spacing_mm).step_mm2;
+    const double step = plan(MeanCurvatureFlow{1e15, MeanCurvatureScheme::kThesis}, grid).step_mm2;
     auto before = wild_noise(grid.size, seed);
     std::vector<float> after(before.size());
     for (int count = 0; count < 10; ++count) {
@@ -268,7 +268,8 @@ TEST(MeanCurvatureFlow, NeverLeavesTheNeighboursRangeOnNoise) {
 TEST(MeanCurvatureFlow, ReachesButDoesNotPassTheNeighboursWhereTheBoundIsSharp) {
   for (const Vector3& spacing : kSpacings) {
     const Grid grid{{9, 9, 9}, spacing};
-    const double step = plan(MeanCurvatureFlow{1e15}, spacing).step_mm2;
+    const double step =
+        plan(MeanCurvatureFlow{1e15, MeanCurvatureScheme::kThesis}, Grid{.spacing_mm = spacing}).step_mm2;
     for (const float height : noise({100, 1, 1}, 3, 0.5, 1)) {
       std::vector<float> cone;
       for_each_voxel(grid, [&](const Size3& i, const Vector3&) {

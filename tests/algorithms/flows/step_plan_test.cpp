@@ -32,20 +32,29 @@ TEST(StepPlan, OfAbsurdStrengthsOrSpacingsNeverEndsRatherThanDoNothing) {
     EXPECT_EQ(plan.steps, most) << flow_time;
     EXPECT_EQ(plan.step_mm2, 0.5) << flow_time;
   }
-  EXPECT_EQ(plan(MeanCurvatureFlow{1e6}, {1e-9, 1e-9, 1e-9}).steps, most);
-  EXPECT_EQ(plan(Laplacian{1e6}, {1e-9, 1, 1}).steps, most);
+  EXPECT_EQ(plan(MeanCurvatureFlow{1e6, MeanCurvatureScheme::kThesis}, Grid{.spacing_mm = {1e-9, 1e-9, 1e-9}})
+                .steps,
+            most);
+  EXPECT_EQ(plan(Laplacian{1e6}, Grid{.spacing_mm = {1e-9, 1, 1}}).steps, most);
 }
 
 /// 1 / ((sum 1/h) sqrt(sum 1/h^2)): 1 / (3 sqrt 3) h^2 = 0.192 h^2 for cubes.
 TEST(StepPlan, OfMeanCurvatureFlowIsTheBoundOfTheRangeProof) {
-  EXPECT_NEAR(plan(MeanCurvatureFlow{1e9}, {1, 1, 1}).step_mm2, 1 / (3 * std::sqrt(3.0)), 1e-5);
-  EXPECT_NEAR(plan(MeanCurvatureFlow{1e9}, {2, 2, 2}).step_mm2, 4 / (3 * std::sqrt(3.0)), 1e-4);
-  EXPECT_NEAR(plan(MeanCurvatureFlow{1e9}, {1, 1, 2.5}).step_mm2, 1 / (2.4 * std::sqrt(2.16)), 1e-5);
+  EXPECT_NEAR(
+      plan(MeanCurvatureFlow{1e9, MeanCurvatureScheme::kThesis}, Grid{.spacing_mm = {1, 1, 1}}).step_mm2,
+      1 / (3 * std::sqrt(3.0)), 1e-5);
+  EXPECT_NEAR(
+      plan(MeanCurvatureFlow{1e9, MeanCurvatureScheme::kThesis}, Grid{.spacing_mm = {2, 2, 2}}).step_mm2,
+      4 / (3 * std::sqrt(3.0)), 1e-4);
+  EXPECT_NEAR(
+      plan(MeanCurvatureFlow{1e9, MeanCurvatureScheme::kThesis}, Grid{.spacing_mm = {1, 1, 2.5}}).step_mm2,
+      1 / (2.4 * std::sqrt(2.16)), 1e-5);
 }
 
 TEST(StepPlan, OfTheLaplacianDampsEveryWave) {
-  EXPECT_NEAR(plan(Laplacian{1e9}, {1, 1, 1}).step_mm2, 1.0 / 12, 1e-9);
-  EXPECT_NEAR(plan(Laplacian{1e9}, {1, 2, 4}).step_mm2, 1 / (4 * (1 + 0.25 + 0.0625)), 1e-9);
+  EXPECT_NEAR(plan(Laplacian{1e9}, Grid{.spacing_mm = {1, 1, 1}}).step_mm2, 1.0 / 12, 1e-9);
+  EXPECT_NEAR(plan(Laplacian{1e9}, Grid{.spacing_mm = {1, 2, 4}}).step_mm2, 1 / (4 * (1 + 0.25 + 0.0625)),
+              1e-9);
 }
 
 }  // namespace

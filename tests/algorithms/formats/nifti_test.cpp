@@ -297,7 +297,7 @@ TEST(NiftiGeometry, UnknownOrientationIsPixdimAloneWithAWarning) {  // N31
 
 TEST(NiftiGeometry, ShearedAxesAreKept) {  // N28
   const auto description = read(NiftiFile{.srow = {1, 0.3, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}}).description;
-  EXPECT_FALSE(is_orthogonal(description.map));
+  EXPECT_FALSE(is_orthogonal(grid_of(description.size, description.map)));
   EXPECT_EQ(description.map.linear[0][1], 0.3F);
 }
 

@@ -37,9 +37,36 @@ TEST(Geometry, OrthogonalMeansCosinesOfAtMostATenThousandth) {
   const auto sheared = [](double shear) {
     return VoxelToWorld{.linear = {{{1, shear, 0}, {0, 1, 0}, {0, 0, 1}}}};
   };
-  EXPECT_TRUE(is_orthogonal(turned()));
-  EXPECT_TRUE(is_orthogonal(sheared(0.9e-4)));
-  EXPECT_FALSE(is_orthogonal(sheared(1.1e-4)));
+  EXPECT_TRUE(is_orthogonal(grid_of({}, turned())));
+  EXPECT_TRUE(is_orthogonal(grid_of({}, sheared(0.9e-4))));
+  EXPECT_FALSE(is_orthogonal(grid_of({}, sheared(1.1e-4))));
+}
+
+/// A grid says lengths, angles and the volume of a voxel as the matrix does, and a volume made on it the
+/// same.
+TEST(Geometry, AGridHasTheMetricOfItsMatrix) {
+  const VoxelToWorld map{.linear = {{{1, 0.5, -0.2}, {0.1, -2, 0.7}, {0, 0.3, 5}}}};
+  const Grid grid = grid_of({4, 5, 6}, map), again = grid_of(*make_volume(grid));
+  for (std::size_t a = 0; a < 3; ++a) {
+    EXPECT_NEAR(again.spacing_mm[a], grid.spacing_mm[a], 1e-14);
+    EXPECT_NEAR(again.cosines[a], grid.cosines[a], 1e-14);
+    for (std::size_t b = 0; b < 3; ++b) {
+      double product = 0;
+      for (std::size_t row = 0; row < 3; ++row) product += map.linear[row][a] * map.linear[row][b];
+      EXPECT_NEAR(metric_of(grid)[a][b], product, 1e-14);
+    }
+  }
+  EXPECT_NEAR(voxel_volume_mm3(grid), std::abs(determinant(map.linear)), 1e-14);
+}
+
+/// The rotated diag(1, 2, 7): 2 + 7, whatever the rotation.
+TEST(Geometry, LargerEigenvaluesOfASymmetricMatrix) {
+  const double c = std::cos(0.7), s = std::sin(0.7);
+  const Matrix3 turned{
+      {{c * c + 2 * s * s, c * s - 2 * c * s, 0}, {c * s - 2 * c * s, s * s + 2 * c * c, 0}, {0, 0, 7}}};
+  EXPECT_NEAR(sum_of_larger_eigenvalues(turned), 9, 1e-13);
+  EXPECT_NEAR(sum_of_larger_eigenvalues({{{1, 1, 0}, {1, 1, 0}, {0, 0, 1}}}), 3, 1e-13);
+  EXPECT_EQ(sum_of_larger_eigenvalues({{{3, 0, 0}, {0, 3, 0}, {0, 0, 3}}}), 6);
 }
 
 TEST(Geometry, ChangingTheFrameTwiceGivesTheSameMap) {
