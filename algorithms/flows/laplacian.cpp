@@ -2,15 +2,16 @@
 
 #include "algorithms/flows/explicit_steps.h"
 #include "algorithms/flows/laplacian_sweep.h"
+#include "algorithms/numerics/selling.h"
 
 namespace volsmooth {
 
 StepPlan plan(const Laplacian& flow, const Grid& grid) {
-  double sum_of_squares = 0;
-  for (const double h : grid.spacing_mm) sum_of_squares += 1 / (h * h);
+  double weights = 0;  // 1/h^2 per axis, at right angles
+  for (const Link& link : selling_links(inverse(metric_of(grid)))) weights += link.weight;
   // Half of what keeps the range: there, noise that alternates from voxel to voxel would only change its
   // sign.
-  return plan_steps(flow.flow_time_mm2, 1 / (4 * sum_of_squares));
+  return plan_steps(flow.flow_time_mm2, 1 / (4 * weights));
 }
 
 void smooth(Volume& volume, const Laplacian& flow, const Progress& report) {

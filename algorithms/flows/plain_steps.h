@@ -37,6 +37,12 @@ struct MirroredField {
     return result;
   }
 
+  bool contains(const Size3& index) const {
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      if (index[axis] < 0 || index[axis] >= size[axis]) return false;
+    return true;
+  }
+
   static Size3 shifted(Size3 index, std::size_t axis, std::int64_t by) {
     index[axis] += by;
     return index;
@@ -86,13 +92,25 @@ void plain_face_centred_step(std::span<const Scalar> from, std::span<Scalar> to,
   });
 }
 
-/// rho_i + dt Laplace rho_i, seven-point.
+/// rho_i + dt Laplace rho_i: seven-point at right angles, else along links of non-negative weight.
 template <class Scalar>
 void plain_laplacian_step(std::span<const Scalar> from, std::span<Scalar> to, const Grid& grid,
                           double step_mm2) {
   const MirroredField<Scalar> rho{from, grid.size};
-  const auto factors = flux_per_difference<Scalar>(grid.spacing_mm, step_mm2);
-  fill_voxels(to, grid.size, [&](const Size3& i) { return diffused(rho(i), rho.neighbours(i), factors); });
+  if (is_orthogonal(grid)) {
+    const auto factors = flux_per_difference<Scalar>(grid.spacing_mm, step_mm2);
+    fill_voxels(to, grid.size, [&](const Size3& i) { return diffused(rho(i), rho.neighbours(i), factors); });
+    return;
+  }
+  const auto links = heat_links<Scalar>(inverse(metric_of(grid)), step_mm2);
+  fill_voxels(to, grid.size, [&](const Size3& i) {
+    Scalar gain = 0;
+    for (const auto& [offset, factor] : links) {
+      const Size3 there{i[0] + offset[0], i[1] + offset[1], i[2] + offset[2]};
+      if (rho.contains(there)) gain += link_gain(rho(i), rho(there), factor);
+    }
+    return rho(i) + gain;
+  });
 }
 
 }  // namespace volsmooth

@@ -109,6 +109,21 @@ Matrix3 metric_of(const Grid& grid) {
   return metric;
 }
 
+Matrix3 steps_of(const Grid& grid) {
+  const Matrix3 angles = metric_of({.cosines = grid.cosines});
+  Matrix3 steps{};  // the upper triangular R in G = R^T R, of steps of length 1
+  for (std::size_t col = 0; col < 3; ++col) {
+    for (std::size_t row = 0; row <= col; ++row) {
+      double rest = angles[row][col];
+      for (std::size_t k = 0; k < row; ++k) rest -= steps[k][row] * steps[k][col];
+      steps[row][col] = row < col ? rest / steps[row][row] : std::sqrt(rest);
+    }
+  }
+  for (Vector3& row : steps)
+    for (std::size_t col = 0; col < 3; ++col) row[col] *= grid.spacing_mm[col];
+  return steps;
+}
+
 std::int64_t voxel_count(const Size3& size) {
   return size[0] * size[1] * size[2];
 }

@@ -49,6 +49,9 @@ bool is_orthogonal(const Grid& grid);  ///< whether the three axes meet at right
 /// G with G_ef = a_e . a_f for the steps a from voxel to voxel: a way of d voxels is sqrt(d^T G d) mm long.
 Matrix3 metric_of(const Grid& grid);
 
+/// The steps a as columns, in a world where the first is along x and the second in the plane of x and y.
+Matrix3 steps_of(const Grid& grid);
+
 std::int64_t voxel_count(const Size3& size);
 double voxel_volume_mm3(const Grid& grid);
 

@@ -1,7 +1,6 @@
 #include "algorithms/volume/volume.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "algorithms/volume/parallel.h"
 
@@ -26,16 +25,7 @@ Volume::Pointer make_volume(const Size3& size, const VoxelToWorld& map) {
 }
 
 Volume::Pointer make_volume(const Grid& grid) {
-  // The columns of R in G = R^T R are steps of the grid's lengths and angles.
-  const Matrix3 metric = metric_of(grid);
-  VoxelToWorld map{.linear = {}, .frame = Frame::kLps};
-  for (std::size_t col = 0; col < 3; ++col) {
-    for (std::size_t row = 0; row <= col; ++row) {
-      double rest = metric[row][col];
-      for (std::size_t k = 0; k < row; ++k) rest -= map.linear[k][row] * map.linear[k][col];
-      map.linear[row][col] = row < col ? rest / map.linear[row][row] : std::sqrt(rest);
-    }
-  }
+  const VoxelToWorld map{.linear = steps_of(grid), .frame = Frame::kLps};
   return make_volume(grid.size, map);
 }
 

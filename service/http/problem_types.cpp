@@ -74,7 +74,6 @@ constexpr auto kTypes = std::to_array<ProblemType>({
     {"unsupported-datatype", 422, "Unsupported voxel type"},
     {"unsupported-dimensionality", 422, "Unsupported number of dimensions"},
     {"unsupported-format", 415, "Unsupported file format"},
-    {"unsupported-geometry", 422, "Unsupported geometry"},
     {"volume-too-large", 422, "The volume is too large"},
     // The service's own troubles
     {"attempts-exhausted", 500, "The job was given up"},

@@ -35,12 +35,6 @@ tl::expected<VolumeFacts, Problem> inspect_upload(const std::filesystem::path& f
                                                   const Progress& report) {
   const auto description = inspect_nifti(file, read_options(options, limits), report);
   if (!description) return tl::unexpected(problem_from(description.error()));
-  if (!is_orthogonal(grid_of(description->size, description->map))) {
-    return tl::unexpected(
-        Problem{"unsupported-geometry",
-                "The voxel axes do not meet at right angles; flows on sheared grids are not offered "
-                "yet. Resample the volume to orthogonal axes first."});
-  }
   return facts_of(*description);
 }
 

@@ -15,13 +15,12 @@ namespace volsmooth {
 /// Calls `visit(index, position_mm)` for every voxel, x fastest, with voxel (0,0,0) centred at the origin.
 template <class Visit>
 void for_each_voxel(const Grid& grid, const Visit& visit) {
+  const VoxelToWorld map{.linear = steps_of(grid)};
   for (std::int64_t z = 0; z < grid.size[2]; ++z)
     for (std::int64_t y = 0; y < grid.size[1]; ++y)
       for (std::int64_t x = 0; x < grid.size[0]; ++x) {
         const Size3 index{x, y, z};
-        Vector3 position;
-        for (std::size_t e = 0; e < 3; ++e) position[e] = static_cast<double>(index[e]) * grid.spacing_mm[e];
-        visit(index, position);
+        visit(index, to_world(map, {static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)}));
       }
 }
 
@@ -47,12 +46,11 @@ inline std::vector<float> values_of(const Volume& volume) {
   return {voxels.begin(), voxels.end()};
 }
 
-/// The centre of the grid's box, in mm.
+/// The centre of the grid, in mm.
 inline Vector3 centre_of(const Grid& grid) {
-  Vector3 centre;
-  for (std::size_t e = 0; e < 3; ++e)
-    centre[e] = 0.5 * static_cast<double>(grid.size[e] - 1) * grid.spacing_mm[e];
-  return centre;
+  Vector3 middle;
+  for (std::size_t e = 0; e < 3; ++e) middle[e] = 0.5 * static_cast<double>(grid.size[e] - 1);
+  return to_world({.linear = steps_of(grid)}, middle);
 }
 
 inline double distance(const Vector3& a, const Vector3& b) {

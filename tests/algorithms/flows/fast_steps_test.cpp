@@ -52,7 +52,8 @@ std::vector<Case> cases() {
   std::vector<Case> all;
   for (const Flow& flow : kFlows)
     for (const auto& [grid, tile] : grids) all.push_back({flow, grid, tile});
-  for (const auto& [grid, tile] : skew_grids) all.push_back({kFlows[1], grid, tile});
+  for (const Flow& flow : {kFlows[1], kFlows[2]})
+    for (const auto& [grid, tile] : skew_grids) all.push_back({flow, grid, tile});
   return all;
 }
 

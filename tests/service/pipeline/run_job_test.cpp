@@ -28,18 +28,19 @@ using testing::UnorderedElementsAre;
 constexpr double kRadius = 10, kVoxels = 33;
 
 /// A float ball of radius 10 mm on 1 mm voxels: intensity 100 - 5 (r - 10 mm) clamped to 0..200, so 100 is
-/// its surface.
-test::NiftiFile ball() {
+/// its surface. A step along z moves `shear` mm along x.
+test::NiftiFile ball(double shear = 0) {
   test::NiftiFile file;
   const auto edge = static_cast<std::int64_t>(kVoxels);
   file.size = {edge, edge, edge};
   file.datatype = 16;
-  file.srow = {1, 0, 0, -16, 0, 1, 0, -16, 0, 0, 1, -16};
+  file.srow = {1, 0, shear, -16 - 16 * shear, 0, 1, 0, -16, 0, 0, 1, -16};
   file.voxels.clear();
   for (std::int64_t z = 0; z < edge; ++z)
     for (std::int64_t y = 0; y < edge; ++y)
       for (std::int64_t x = 0; x < edge; ++x) {
-        const double r = std::hypot(double(x) - 16, double(y) - 16, double(z) - 16);
+        const double r =
+            std::hypot(double(x) - 16 + shear * (double(z) - 16), double(y) - 16, double(z) - 16);
         file.voxels.push_back(std::clamp(100 - 5 * (r - kRadius), 0.0, 200.0));
       }
   return file;
@@ -270,15 +271,26 @@ TEST_F(RunJob, ProgressStaysWithinTheWholeAndReachesItsEnd) {
   EXPECT_GT(largest, 0.9);
 }
 
-TEST(Inspect, AShearedGridIsRefused) {
-  const ScratchFolder folder;
-  test::NiftiFile file;
-  file.srow = {1, 0.2, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
-  const auto bytes = test::bytes_of(file);
-  const auto path = folder.put("volume", {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
-  const auto facts = make_engine({}).inspect(path, {}, no_progress);
-  ASSERT_FALSE(facts);
-  EXPECT_EQ(facts.error().slug, "unsupported-geometry");
+/// Axes sheared by 20 degrees: the ball shrinks in millimetres as on any other grid, and the header comes
+/// back.
+TEST_F(RunJob, AShearedGridIsSmoothedInMillimetres) {
+  for (const char* method : {"mean-curvature-flow", "laplacian"}) {
+    ComputeTask task = task_for(ball(std::tan(20 * std::numbers::pi / 180)));
+    task.order.method = method;
+    task.order.mesh_formats = {};
+    run(task);
+    const auto surface = report()["surfaces"][0];
+    const double before = kRadius, after = std::sqrt(kRadius * kRadius - 16);
+    EXPECT_NEAR(surface["volume_mm3"]["before"], 4 * std::numbers::pi / 3 * std::pow(before, 3), 0.01 * 4189);
+    if (task.order.method == "mean-curvature-flow") {
+      EXPECT_NEAR(surface["volume_mm3"]["after"], 4 * std::numbers::pi / 3 * std::pow(after, 3), 0.02 * 3225);
+    }
+    EXPECT_TRUE(surface["closed"].get<bool>());
+    const auto written = inspect_nifti(task.output_dir / (task.order.method + ".nii.gz"), {});
+    ASSERT_TRUE(written);
+    EXPECT_EQ(written->map.linear, inspect_nifti(task.volume_file, {})->map.linear);
+    std::filesystem::remove_all(task.output_dir);
+  }
 }
 
 }  // namespace
