@@ -5,6 +5,7 @@
 #include <atomic>
 #include <mutex>
 
+#include "algorithms/flows/conservative_mean_curvature_flow.h"
 #include "algorithms/flows/laplacian.h"
 #include "algorithms/flows/mean_curvature_flow.h"
 #include "algorithms/volume/parallel.h"
@@ -23,6 +24,10 @@ struct Case {
 const Case kCases[] = {
     {"MeanCurvatureFlow",
      [](Volume& volume, const Progress& report) { smooth(volume, MeanCurvatureFlow{1}, report); }},
+    {"ConservativeMeanCurvatureFlow",
+     [](Volume& volume, const Progress& report) {
+       smooth(volume, ConservativeMeanCurvatureFlow{1}, report);
+     }},
     {"Laplacian", [](Volume& volume, const Progress& report) { smooth(volume, Laplacian{1}, report); }}};
 
 class Flow : public testing::TestWithParam<Case> {};

@@ -1,0 +1,89 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "algorithms/progress.h"
+
+namespace volsmooth {
+
+/// What a step with a constant made of a volume, in intensity x voxels.
+struct BalancedMass {
+  double mass = 0;      ///< sum of the new values
+  double response = 0;  ///< by how much it falls when the constant grows by one
+
+  BalancedMass& operator+=(const BalancedMass& more);
+};
+
+/// The sums over a volume, row by row along x: in double, in an order that depends on nothing but its size.
+class RowSums {
+ public:
+  explicit RowSums(std::int64_t rows) : rows_(static_cast<std::size_t>(rows)) {}
+
+  /// Rows are independent of one another: several threads may set different ones.
+  void set(std::int64_t row, std::span<const float> moved, std::span<const float> response);
+  BalancedMass total() const;
+
+ private:
+  std::vector<BalancedMass> rows_;
+};
+
+/// Sum of all values and of all their magnitudes.
+struct Mass {
+  double sum = 0, magnitude = 0;
+};
+Mass mass_of(std::span<const float> values, const Progress& report = no_progress);
+
+/// Finds the constant for which a step leaves the mass what it was at the start: of the whole flow, so that
+/// what rounding takes in one step the next gives back.
+template <class Scalar>
+class MassBalance {
+ public:
+  /// Writes the values of a step with a constant, from the same values at every call.
+  using Step = std::function<BalancedMass(Scalar constant, const Progress& report)>;
+
+  /// `tolerance`: of the mass, relative to the sum of magnitudes. The constant is looked for in
+  /// (-limit, limit).
+  MassBalance(const Mass& mass, double tolerance, Scalar limit)
+      : mass_(mass.sum), tolerance_(tolerance * mass.magnitude), limit_(limit) {}
+
+  /// Repeats `step` until it keeps the mass, by Newton's method in a bracket, starting where the last two
+  /// steps' constants point to. The mass falls piecewise linearly in the constant: two calls are the rule,
+  /// and one once the data are smooth. When no constant keeps it to the tolerance, for volumes of a few
+  /// voxels, the nearest ones were tried last.
+  void take(const Step& step, const Progress& report = no_progress) {
+    constexpr int kMostCalls = 40;
+    const Scalar before = constant_;
+    constant_ = std::clamp(before + trend_, -limit_, limit_);
+    Scalar low = -limit_, high = limit_;
+    double left = 1;
+    for (int call = 0; call < kMostCalls; ++call) {
+      const BalancedMass got = step(constant_, part_of(report, 1 - left, 1 - left / 2));
+      left /= 2;
+      const double surplus = got.mass - mass_;
+      if (std::abs(surplus) <= tolerance_) break;
+      (surplus > 0 ? low : high) = constant_;
+      auto next = static_cast<Scalar>(static_cast<double>(constant_) + surplus / got.response);
+      if (!(next > low && next < high)) next = low + (high - low) / 2;
+      if (next == low || next == high) break;
+      constant_ = next;
+    }
+    trend_ = taken_++ > 0 ? constant_ - before : Scalar{0};
+    report(1);
+  }
+
+  Scalar constant() const { return constant_; }  ///< of the last step
+
+ private:
+  double mass_, tolerance_;
+  Scalar limit_;
+  Scalar constant_ = 0;
+  Scalar trend_ = 0;        ///< by how much the last step changed it
+  std::int64_t taken_ = 0;  ///< steps
+};
+
+}  // namespace volsmooth
