@@ -21,23 +21,33 @@ struct Rows {
   }
 };
 
-/// The sums of row (y, z): intensities, and lengths of the gradient.
-FoliationMeasures measure_row(const Rows& rows, const AnyMetric<double>& metric, std::int64_t y,
-                              std::int64_t z) {
+/// Calls `visit(x, |grad rho|)` along row (y, z), the gradient by central differences.
+template <class Visit>
+void visit_gradients(const Rows& rows, const AnyMetric<double>& metric, std::int64_t y, std::int64_t z,
+                     const Visit& visit) {
   const float* here = rows(y, z);
   const float *south = rows(y - 1, z), *north = rows(y + 1, z);
   const float *below = rows(y, z - 1), *above = rows(y, z + 1);
   const std::int64_t last = rows.size[0] - 1;
-  FoliationMeasures sums{.minimum = here[0], .maximum = here[0]};
   for (std::int64_t x = 0; x <= last; ++x) {
     const float left = here[x > 0 ? x - 1 : 0], right = here[x < last ? x + 1 : last];
     const auto gradient = metric.gradient({0.5 * (double{right} - left), 0.5 * (double{north[x]} - south[x]),
                                            0.5 * (double{above[x]} - below[x])});
-    sums.area += std::sqrt(square_of(gradient));
+    visit(x, std::sqrt(square_of(gradient)));
+  }
+}
+
+/// The sums of row (y, z): intensities, and lengths of the gradient.
+FoliationMeasures measure_row(const Rows& rows, const AnyMetric<double>& metric, std::int64_t y,
+                              std::int64_t z) {
+  const float* here = rows(y, z);
+  FoliationMeasures sums{.minimum = here[0], .maximum = here[0]};
+  visit_gradients(rows, metric, y, z, [&](std::int64_t x, double gradient) {
+    sums.area += gradient;
     sums.mass += double{here[x]};
     sums.minimum = std::min(sums.minimum, here[x]);
     sums.maximum = std::max(sums.maximum, here[x]);
-  }
+  });
   return sums;
 }
 
@@ -48,6 +58,16 @@ void add(FoliationMeasures& sums, const FoliationMeasures& more) {
   sums.maximum = std::max(sums.maximum, more.maximum);
 }
 
+/// Rows that are worth a thread's while, and not too long for one that is cancelled.
+std::int64_t rows_of_chunk(const Size3& size) {
+  constexpr std::int64_t kVoxelsOfChunk = 1 << 18;
+  return std::clamp<std::int64_t>(kVoxelsOfChunk / size[0], 1, 256);
+}
+
+std::size_t chunks_of(std::int64_t count, std::int64_t grain) {
+  return static_cast<std::size_t>((count + grain - 1) / grain);
+}
+
 }  // namespace
 
 FoliationMeasures measure(const Volume& volume, const Progress& report) {
@@ -56,15 +76,13 @@ FoliationMeasures measure(const Volume& volume, const Progress& report) {
   const AnyMetric<double> metric(metric_of(grid));
 
   const std::int64_t row_count = grid.size[1] * grid.size[2];
-  constexpr std::int64_t kVoxelsOfChunk = 1 << 18;
-  const std::int64_t rows_of_chunk = std::clamp<std::int64_t>(kVoxelsOfChunk / grid.size[0], 1, 256);
+  const std::int64_t grain = rows_of_chunk(grid.size);
   const FoliationMeasures none{.minimum = rows.voxels[0], .maximum = rows.voxels[0]};
-  std::vector<FoliationMeasures> chunks(
-      static_cast<std::size_t>((row_count + rows_of_chunk - 1) / rows_of_chunk), none);
+  std::vector<FoliationMeasures> chunks(chunks_of(row_count, grain), none);
   parallel_for(
-      row_count, rows_of_chunk,
+      row_count, grain,
       [&](std::int64_t begin, std::int64_t end) {
-        FoliationMeasures& chunk = chunks[static_cast<std::size_t>(begin / rows_of_chunk)];
+        FoliationMeasures& chunk = chunks[static_cast<std::size_t>(begin / grain)];
         for (std::int64_t row = begin; row < end; ++row)
           add(chunk, measure_row(rows, metric, row % grid.size[1], row / grid.size[1]));
       },
@@ -75,6 +93,50 @@ FoliationMeasures measure(const Volume& volume, const Progress& report) {
   total.mass *= voxel_volume_mm3(grid);
   total.area *= voxel_volume_mm3(grid);
   return total;
+}
+
+Volume::Pointer cell_areas(const Volume& volume, const Progress& report) {
+  const Grid grid = grid_of(volume);
+  const Rows rows{volume.GetBufferPointer(), grid.size};
+  const AnyMetric<double> metric(metric_of(grid));
+  const double cell_mm3 = voxel_volume_mm3(grid);
+  auto areas = Volume::New();
+  areas->CopyInformation(&volume);
+  areas->SetRegions(volume.GetLargestPossibleRegion());
+  areas->Allocate();
+  parallel_for(
+      grid.size[1] * grid.size[2], rows_of_chunk(grid.size),
+      [&](std::int64_t begin, std::int64_t end) {
+        for (std::int64_t row = begin; row < end; ++row) {
+          float* to = areas->GetBufferPointer() + row * grid.size[0];
+          visit_gradients(
+              rows, metric, row % grid.size[1], row / grid.size[1],
+              [&](std::int64_t x, double gradient) { to[x] = static_cast<float>(gradient * cell_mm3); });
+        }
+      },
+      report);
+  return areas;
+}
+
+double deviation(const Volume& density, const Progress& report) {
+  constexpr std::int64_t kChunk = 1 << 18;
+  const Grid grid = grid_of(density);
+  const float* rho = density.GetBufferPointer();
+  const std::int64_t count = voxel_count(grid.size);
+  std::vector<double> chunks(chunks_of(count, kChunk));
+  parallel_for(
+      count, kChunk,
+      [&](std::int64_t begin, std::int64_t end) {
+        double& chunk = chunks[static_cast<std::size_t>(begin / kChunk)];
+        for (std::int64_t voxel = begin; voxel < end; ++voxel) {
+          const double square = (double{rho[voxel]} - 0.5) * (double{rho[voxel]} - 0.5);
+          chunk += square * square;
+        }
+      },
+      report);
+  double total = 0;
+  for (const double chunk : chunks) total += chunk;
+  return total * voxel_volume_mm3(grid);
 }
 
 }  // namespace volsmooth

@@ -43,6 +43,52 @@ TEST(Measure, OfASoftBallIsTheAreaOfItsSpheres) {
   EXPECT_NEAR(area / exact, 1, 0.03);
 }
 
+TEST(CellAreas, AddUpToTheAreaOnTheSameGrid) {
+  const Grid grid{{13, 12, 11}, {1, 0.5, 2}, {0.2, -0.3, 0.1}};
+  const auto volume = volume_of(grid, noise(grid.size, 2, -10, 10));
+  const auto areas = cell_areas(*volume);
+  double sum = 0;
+  for (const float area : voxels_of(*areas)) sum += double{area};
+  EXPECT_NEAR(sum / measure(*volume).area, 1, 1e-7);
+  EXPECT_EQ(areas->GetDirection(), volume->GetDirection());
+  EXPECT_EQ(areas->GetSpacing(), volume->GetSpacing());
+  EXPECT_EQ(areas->GetOrigin(), volume->GetOrigin());
+}
+
+/// Of a ramp of slope 3 per mm: 3 times the cell's volume, half of that in the end planes.
+TEST(CellAreas, OfARampAreItsSlopeTimesTheCell) {
+  const Grid grid{{5, 4, 3}, {1, 2, 0.5}};
+  const auto areas = cell_areas(*volume_of(grid, sampled(grid, [](const Vector3& x) { return 3 * x[1]; })));
+  std::size_t voxel = 0;
+  for_each_voxel(grid, [&](const Size3& i, const Vector3&) {
+    EXPECT_EQ(voxels_of(*areas)[voxel++], i[1] == 0 || i[1] == 3 ? 1.5F : 3.0F);
+  });
+}
+
+TEST(Deviation, IsTheFourthPowerOfTheDistanceToOneHalf) {
+  const Grid grid{{2, 2, 1}, {1, 2, 0.5}};
+  EXPECT_DOUBLE_EQ(deviation(*volume_of(grid, {0, 1, 1, 0})), 4.0 / 16);
+  EXPECT_DOUBLE_EQ(deviation(*volume_of(grid, {0.5, 0.5, 0.5, 0.5})), 0);
+  EXPECT_DOUBLE_EQ(deviation(*volume_of(grid, {0.25, 0.5, 0.5, 0.5})), 1.0 / 256);
+}
+
+/// A plane of width w, rho = (1 + tanh(x/w))/2, lacks the integral of (1 - tanh^4)/16, which is w/6 per mm^2.
+TEST(Deviation, OfASoftPlaneLacksASixthOfItsWidth) {
+  const Grid grid{{4, 80, 4}, {1, 0.5, 1}};
+  const auto plane =
+      sampled(grid, [&](const Vector3& x) { return soft_step(0, 3)(centre_of(grid)[1] - x[1]); });
+  EXPECT_NEAR(deviation(*volume_of(grid, plane)), 16 * (40.0 / 16 - 3.0 / 6), 1e-4);
+}
+
+TEST(Deviation, DoesNotDependOnTheNumberOfThreads) {
+  const Grid grid{{97, 91, 83}, {1, 1, 1}};
+  const auto volume = volume_of(grid, noise(grid.size, 1));
+  double one = 0, many = 0;
+  with_threads(1, [&] { one = deviation(*volume); });
+  with_threads(5, [&] { many = deviation(*volume); });
+  EXPECT_EQ(one, many);
+}
+
 TEST(Measure, DoesNotDependOnTheNumberOfThreads) {
   const Grid grid{{31, 67, 23}, {1, 1, 1}};
   const auto volume = volume_of(grid, noise(grid.size, 1, -1000, 1000));
