@@ -1,8 +1,8 @@
-#include "algorithms/flows/conservative_sweep.h"
-
 #include <gtest/gtest.h>
 
+#include "algorithms/flows/conservative_sweep.h"
 #include "algorithms/flows/plain_balanced_steps.h"
+#include "algorithms/flows/sharpening_sweep.h"
 #include "tests/support/phantoms.h"
 
 namespace volsmooth {
@@ -23,22 +23,34 @@ const Case kCases[] = {{{{17, 13, 11}, {1, 1, 1}}, {64, 48}},
                        {{{17, 13, 11}, {1, 1, 1}, {0.1, -0.3, 0.5}}, {64, 48}},
                        {{{17, 5, 6}, {1, 1, 5}, {0, 0.34, 0}}, {3, 2}}};
 
-/// The bytes; and the sums, of values below 1000, to the rounding of 2^12 additions in double.
-TEST(BalancedStep, GivesTheBytesAndTheSumsOfThePlainOneOnNoise) {
+using PlainStep = BalancedMass (*)(std::span<const float>, std::span<float>, const Grid&, double, float);
+using FastStep = BalancedMass (*)(std::span<const float>, std::span<float>, const Grid&, double, float,
+                                  InstructionSet, const TileShape&, const Progress&);
+
+/// The bytes; and the sums, of values below `largest`, to the rounding of 2^12 additions in double.
+void expect_same(PlainStep plain_step, FastStep fast_step, float largest, std::span<const float> constants) {
   for (const auto& [grid, tile] : kCases) {
-    const double smallest = *std::ranges::min_element(grid.spacing_mm), step = 0.15 * smallest * smallest;
-    const auto before = noise(grid.size, 7, -1000, 1000);
+    const double step = 0.15 * *std::ranges::min_element(grid.spacing_mm);
+    const auto before = noise(grid.size, 7, 0, largest);
     std::vector<float> plain(before.size()), fast(before.size());
-    for (const float constant : {0.0F, -0.7F, 4.0F}) {
-      const BalancedMass exact = plain_balanced_step<float>(before, plain, grid, step, constant);
+    for (const float constant : constants) {
+      const BalancedMass exact = plain_step(before, plain, grid, step, constant);
       for (const InstructionSet set : instruction_sets()) {
-        const BalancedMass sums = balanced_step(before, fast, grid, step, constant, set, tile, no_progress);
+        const BalancedMass sums = fast_step(before, fast, grid, step, constant, set, tile, no_progress);
         EXPECT_EQ(fast, plain) << "size " << grid.size[0] << ", constant " << constant;
-        EXPECT_NEAR(sums.mass, exact.mass, 1e-8);
-        EXPECT_NEAR(sums.response, exact.response, 1e-8);
+        EXPECT_NEAR(sums.mass, exact.mass, 1e-11 * double{largest});
+        EXPECT_NEAR(sums.response, exact.response, 1e-12 * exact.response);
       }
     }
   }
+}
+
+TEST(BalancedStep, GivesTheBytesAndTheSumsOfThePlainOneOnNoise) {
+  expect_same(plain_balanced_step<float>, balanced_step, 1000, std::vector<float>{0, -0.7F, 4});
+}
+
+TEST(SharpeningStep, GivesTheBytesAndTheSumsOfThePlainOneOnNoise) {
+  expect_same(plain_sharpening_step<float>, sharpening_step, 1, std::vector<float>{0, -0.1F, 0.02F});
 }
 
 /// By how much the mass falls from one constant to the next one.

@@ -8,6 +8,7 @@
 #include "algorithms/flows/conservative_mean_curvature_flow.h"
 #include "algorithms/flows/laplacian.h"
 #include "algorithms/flows/mean_curvature_flow.h"
+#include "algorithms/flows/sharpening.h"
 #include "algorithms/volume/parallel.h"
 #include "tests/support/phantoms.h"
 
@@ -28,6 +29,7 @@ const Case kCases[] = {
      [](Volume& volume, const Progress& report) {
        smooth(volume, ConservativeMeanCurvatureFlow{1}, report);
      }},
+    {"Sharpening", [](Volume& volume, const Progress& report) { smooth(volume, Sharpening{1.5}, report); }},
     {"Laplacian", [](Volume& volume, const Progress& report) { smooth(volume, Laplacian{1}, report); }}};
 
 class Flow : public testing::TestWithParam<Case> {};

@@ -1,0 +1,56 @@
+#include "algorithms/flows/sharpening_sweep.h"
+
+#include "algorithms/flows/balanced_rows.h"
+#include "algorithms/flows/grid_metric.h"
+#include "algorithms/numerics/sharpening.h"
+
+namespace volsmooth {
+namespace {
+
+template <class Metric>
+VOLSMOOTH_FORMULA void sharpen_row(const BalancedRow<Metric>& row) {
+  balance_row(row, [&](const auto& rho) VOLSMOOTH_INLINE {
+    return sharpened<float>(rho, row.metric, row.constant, row.time);
+  });
+}
+
+using OrthogonalRow = BalancedRow<OrthogonalMetric<float>>;
+using AnyRow = BalancedRow<AnyMetric<float>>;
+
+VOLSMOOTH_FORMULA void orthogonal(const OrthogonalRow& row) {
+  sharpen_row(row);
+}
+VOLSMOOTH_FORMULA void skew(const AnyRow& row) {
+  sharpen_row(row);
+}
+VOLSMOOTH_ROW_KERNEL(orthogonal, OrthogonalRow)
+VOLSMOOTH_ROW_KERNEL(skew, AnyRow)
+
+auto kernel_for(const OrthogonalMetric<float>&, InstructionSet set) {
+  return orthogonal_for(set);
+}
+auto kernel_for(const AnyMetric<float>&, InstructionSet set) {
+  return skew_for(set);
+}
+
+}  // namespace
+
+BalancedMass sharpening_step(std::span<const float> from, std::span<float> to, const Grid& grid,
+                             double step_mm, float constant, InstructionSet set, const TileShape& shape,
+                             const Progress& report) {
+  BalancedMass sums;
+  with_metric<float>(grid, [&](const auto& metric) {
+    const BalancedRow<std::decay_t<decltype(metric)>> row{
+        .metric = metric, .constant = constant, .time = static_cast<float>(step_mm / unit_of(grid))};
+    sums = balance_rows(from, to, grid.size, row, kernel_for(metric, set), shape, report);
+  });
+  return sums;
+}
+
+BalancedMass sharpening_step(std::span<const float> from, std::span<float> to, const Grid& grid,
+                             double step_mm, float constant, const Progress& report) {
+  return sharpening_step(from, to, grid, step_mm, constant, instruction_sets().back(),
+                         cached_tile(grid.size, 1), report);
+}
+
+}  // namespace volsmooth
