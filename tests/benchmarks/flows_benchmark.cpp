@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "algorithms/flows/face_centred_sweep.h"
 #include "algorithms/flows/laplacian_sweep.h"
 #include "algorithms/flows/mean_curvature_sweep.h"
 #include "algorithms/volume/parallel.h"
@@ -38,6 +39,10 @@ void copy() {
   parallel_for(static_cast<std::int64_t>(from.size()), 1 << 18, [&](std::int64_t begin, std::int64_t end) {
     std::copy(from.data() + begin, from.data() + end, to + begin);
   });
+}
+
+void face_centred() {
+  face_centred_step(voxels_of(*data().volume), data().next, data().grid, kStep);
 }
 
 void mean_curvature() {
@@ -77,14 +82,17 @@ void flow_steps(benchmark::State& state) {
     for ([[maybe_unused]] auto round : state) {
       const double streaming = seconds(copy);
       const double curvature = seconds(mean_curvature);
+      const double default_curvature = seconds(face_centred);
       const double heat = seconds(laplacian);
       const double itk = seconds([&] { itk_curvature_flow(threads); }) / kItkIterations;
       state.SetIterationTime(curvature);
       rounds["copy_seconds"].push_back(streaming);
       rounds["mcf_seconds"].push_back(curvature);
+      rounds["face_centred_seconds"].push_back(default_curvature);
       rounds["laplacian_seconds"].push_back(heat);
       rounds["itk_seconds"].push_back(itk);
       rounds["itk_over_mcf"].push_back(itk / curvature);
+      rounds["itk_over_face_centred"].push_back(itk / default_curvature);
       rounds["mcf_over_copy"].push_back(curvature / streaming);
       rounds["laplacian_over_copy"].push_back(heat / streaming);
     }
