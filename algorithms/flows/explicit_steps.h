@@ -9,7 +9,8 @@
 
 namespace volsmooth {
 
-/// One explicit step: reads all of `from`, writes all of `to`.
+/// One explicit step: reads all of `from`, writes all of `to`, where there still is what the step before
+/// read.
 using ExplicitStep =
     std::function<void(std::span<const float> from, std::span<float> to, const Progress& report)>;
 

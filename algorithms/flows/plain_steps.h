@@ -3,6 +3,8 @@
 #include <span>
 
 #include "algorithms/flows/grid_metric.h"
+#include "algorithms/flows/offset_sweep.h"
+#include "algorithms/flows/upwind_metric.h"
 #include "algorithms/numerics/curvature.h"
 #include "algorithms/numerics/diffusion.h"
 #include "algorithms/numerics/face_centred.h"
@@ -88,6 +90,27 @@ void plain_face_centred_step(std::span<const Scalar> from, std::span<Scalar> to,
         return rho({i[0] + at[0], i[1] + at[1], i[2] + at[2]});
       };
       return face_centred_moved<Scalar>(around, metric, time);
+    });
+  });
+}
+
+/// rho_i + dt mu |grad rho|+ or, where mu < 0, |grad rho|- (thesis, Eq. 6.4), on any axes; as the second of
+/// Heun's stages, the mean of that and of what stands in `to`.
+template <class Scalar>
+void plain_offset_stage(std::span<const Scalar> from, std::span<Scalar> to, const Grid& grid,
+                        const OffsetStage& stage) {
+  const MirroredField<Scalar> rho{from, grid.size};
+  const auto step = normal_step<Scalar>(grid, stage);
+  with_upwind_metric<Scalar>(grid, [&](const auto& metric) {
+    with_scheme(stage.gains, stage.upwind, [&](auto gains, auto upwind) {
+      std::size_t voxel = 0;
+      fill_voxels(to, grid.size, [&](const Size3& i) {
+        const auto along = [&](std::size_t axis, int k) { return rho(rho.shifted(i, axis, k)); };
+        const auto moved =
+            moved_along_normal<gains(), upwind()>(along, speed_of<Scalar>(stage, voxel), metric, step);
+        const Scalar stood = to[voxel++];
+        return stage.second_of_heun ? Scalar{0.5F} * (stood + moved) : moved;
+      });
     });
   });
 }
