@@ -2,15 +2,45 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
 
+#include "algorithms/flows/conservative_mean_curvature_flow.h"
 #include "algorithms/flows/laplacian.h"
 #include "algorithms/flows/mean_curvature_flow.h"
+#include "algorithms/flows/offset.h"
+#include "algorithms/flows/sharpening.h"
+#include "algorithms/volume/density.h"
 
 namespace volsmooth {
 namespace {
 
-/// Strength is asked for in one of two ways: the radius of the balls that vanish, or the flow time r^2/4.
-std::vector<ParameterInfo> strength_parameters() {
+double number(const ParameterValues& values, const std::string& name) {
+  return std::get<double>(values.at(name));
+}
+
+double number(const ParameterValues& values, const std::string& name, double otherwise) {
+  return values.contains(name) ? number(values, name) : otherwise;
+}
+
+std::string text(const ParameterValues& values, const std::string& name, const std::string& otherwise) {
+  const auto found = values.find(name);
+  return found == values.end() ? otherwise : std::get<std::string>(found->second);
+}
+
+using Parameters = std::vector<ParameterInfo>;
+
+constexpr double kSharpeningBytesPerVoxel = 3 * sizeof(float);  // the next volume and the two gradients
+
+Parameters joined(Parameters some, Parameters more) {
+  std::ranges::move(more, std::back_inserter(some));
+  return some;
+}
+
+// ---- strength: the radius of the balls that vanish, or the flow time r^2/4
+// -----------------------------------
+
+Parameters strength_parameters() {
   return {{.name = "feature_radius_mm",
            .description = "Balls of a smaller radius vanish under mean curvature flow; cylinders of this "
                           "radius shrink to 0.71 of it.",
@@ -28,53 +58,237 @@ std::vector<ParameterInfo> strength_parameters() {
            .excludes = "feature_radius_mm"}};
 }
 
-double number(const ParameterValues& values, const std::string& name, double otherwise) {
-  const auto found = values.find(name);
-  return found == values.end() ? otherwise : std::get<double>(found->second);
+double mean_spacing(const Grid& grid) {
+  return std::cbrt(voxel_volume_mm3(grid));
 }
 
-ParameterValues resolve_strength(const ParameterValues& asked, const Grid& grid) {
-  const double default_radius = 2 * std::cbrt(voxel_volume_mm3(grid));
-  const double radius = number(asked, "feature_radius_mm", default_radius);
+ParameterValues resolve_strength(const ParameterValues& asked, const MethodInput& input) {
+  const double radius = number(asked, "feature_radius_mm", 2 * mean_spacing(input.grid));
   const double flow_time = number(asked, "flow_time_mm2", radius * radius / 4);
   return {{"flow_time_mm2", flow_time}, {"feature_radius_mm", 2 * std::sqrt(flow_time)}};
 }
 
+// ---- single-surface mode: a density made around one isovalue
+// --------------------------------------------------
+
+ParameterInfo surface_parameter() {
+  return {.name = "surface",
+          .description =
+              "The isovalue of the one surface that counts: the volume becomes a density around it, "
+              "and intensities away from it are flattened.",
+          .unit = "intensity",
+          .minimum = std::numeric_limits<double>::lowest(),
+          .maximum = std::numeric_limits<double>::max(),
+          .default_text = "none: all surfaces count alike",
+          .is_isovalue = true};
+}
+
+ParameterInfo half_width_parameter() {
+  return {.name = "half_width",
+          .description = "Intensities this far below and above the surface become 0 and 1 in the density.",
+          .unit = "intensity",
+          .minimum = 1e-30,
+          .maximum = std::numeric_limits<float>::max(),
+          .default_text = "a tenth of the range of the valid intensities",
+          .needs = "surface"};
+}
+
+void resolve_surface(ParameterValues& resolved, const ParameterValues& asked, const MethodInput& input) {
+  if (!asked.contains("surface")) return;
+  const double tenth = (input.intensity_max - input.intensity_min) / 10;
+  resolved["surface"] = asked.at("surface");
+  resolved["half_width"] = number(asked, "half_width", tenth > 0 ? tenth : 1);
+}
+
+/// Runs `flow` on the volume, or on the density around its surface where one is named.
+template <class Flow>
+void smooth_as_asked(Volume& volume, const Flow& flow, const ParameterValues& resolved,
+                     const Progress& report) {
+  if (!resolved.contains("surface")) return smooth(volume, flow, report);
+  const DensityWindow window{number(resolved, "surface"), number(resolved, "half_width")};
+  to_density(volume, window, part_of(report, 0, 0.02));
+  smooth(volume, flow, part_of(report, 0.02, 0.98));
+  to_intensity(volume, window, part_of(report, 0.98, 1));
+}
+
+// ---- rows
+// -----------------------------------------------------------------------------------------------------
+
+/// A choice of a parameter, and what it stands for.
+template <class Meaning>
+using Choices = std::vector<std::pair<std::string, Meaning>>;
+
+template <class Meaning>
+ParameterInfo choice_parameter(std::string name, std::string description, const Choices<Meaning>& choices) {
+  ParameterInfo info{.name = std::move(name), .description = std::move(description), .unit = {}};
+  for (const auto& choice : choices) info.choices.push_back(choice.first);
+  info.default_value = info.choices.front();
+  return info;
+}
+
+template <class Meaning>
+Meaning chosen(const Choices<Meaning>& choices, const std::string& name) {
+  return std::ranges::find(choices, name, &std::pair<std::string, Meaning>::first)->second;
+}
+
+const Choices<MeanCurvatureScheme>& mean_curvature_schemes() {
+  static const Choices<MeanCurvatureScheme> schemes{{"face-centred", MeanCurvatureScheme::kFaceCentred},
+                                                    {"thesis", MeanCurvatureScheme::kThesis}};
+  return schemes;
+}
+
+MeanCurvatureFlow mean_curvature_flow(const ParameterValues& resolved) {
+  return {.flow_time_mm2 = number(resolved, "flow_time_mm2"),
+          .scheme = chosen(mean_curvature_schemes(), text(resolved, "scheme", "face-centred"))};
+}
+
+ConservativeMeanCurvatureFlow conservative_flow(const ParameterValues& resolved) {
+  return {.flow_time_mm2 = number(resolved, "flow_time_mm2")};
+}
+
+Laplacian laplacian(const ParameterValues& resolved) {
+  return {.flow_time_mm2 = number(resolved, "flow_time_mm2")};
+}
+
 /// The row of a flow whose strength is its flow time.
 template <class Flow>
-Method flow_method(std::string name, std::string description) {
+Method flow_method(std::string name, std::string description, Parameters more,
+                   Flow (*flow_of)(const ParameterValues& resolved)) {
   return {.info = {.name = std::move(name),
                    .description = std::move(description),
-                   .parameters = strength_parameters()},
+                   .parameters = joined(strength_parameters(), std::move(more))},
           .resolve =
-              [](const ParameterValues& asked, const Grid& grid) {
-                ParameterValues resolved = resolve_strength(asked, grid);
-                const StepPlan steps =
-                    plan(Flow{.flow_time_mm2 = std::get<double>(resolved["flow_time_mm2"])}, grid);
+              [flow_of](const ParameterValues& asked, const MethodInput& input) {
+                ParameterValues resolved = resolve_strength(asked, input);
+                if (asked.contains("scheme")) resolved["scheme"] = asked.at("scheme");
+                resolve_surface(resolved, asked, input);
+                const StepPlan steps = plan(flow_of(resolved), input.grid);
                 resolved["step_mm2"] = steps.step_mm2;
                 resolved["steps"] = static_cast<double>(steps.steps);
                 return resolved;
               },
           .run =
-              [](Volume& volume, const ParameterValues& resolved, const Progress& report) {
-                smooth(volume, Flow{.flow_time_mm2 = std::get<double>(resolved.at("flow_time_mm2"))}, report);
+              [flow_of](Volume& volume, const ParameterValues& resolved, const Progress& report) {
+                smooth_as_asked(volume, flow_of(resolved), resolved, report);
               },
           .extra_bytes_per_voxel = sizeof(float)};
 }
 
+const Choices<Reconstruction>& offset_gains() {
+  static const Choices<Reconstruction> gains{{"weno", Reconstruction::kWeno7},
+                                             {"weno5", Reconstruction::kWeno5},
+                                             {"piecewise-constant", Reconstruction::kPiecewiseConstant}};
+  return gains;
+}
+
+const Choices<UpwindGradient>& upwind_gradients() {
+  static const Choices<UpwindGradient> gradients{{"godunov", UpwindGradient::kGodunov},
+                                                 {"engquist-osher", UpwindGradient::kEngquistOsher}};
+  return gradients;
+}
+
+Offset offset(const ParameterValues& resolved) {
+  return {.distance_mm = number(resolved, "distance_mm"),
+          .gains = chosen(offset_gains(), text(resolved, "gains", "weno")),
+          .upwind = chosen(upwind_gradients(), text(resolved, "upwind", "godunov"))};
+}
+
+Method offset_method() {
+  Parameters parameters{
+      {.name = "distance_mm",
+       .description = "How far every isosurface moves towards lower intensities; negative: "
+                      "towards higher ones.",
+       .unit = "mm",
+       .minimum = -2000,
+       .maximum = 2000,
+       .default_text = "none: it must be given",
+       .required = true},
+      choice_parameter("gains", "How the mass that a voxel gains is reconstructed.", offset_gains()),
+      choice_parameter("upwind", "How gains of the axes become the gradient's length.", upwind_gradients()),
+      surface_parameter(),
+      half_width_parameter()};
+  return {.info = {.name = "offset",
+                   .description = "Moves every isosurface along its normal by one distance: outward edges "
+                                  "become round, inward ones stay sharp.",
+                   .parameters = std::move(parameters)},
+          .resolve =
+              [](const ParameterValues& asked, const MethodInput& input) {
+                ParameterValues resolved = asked;
+                resolve_surface(resolved, asked, input);
+                const OffsetPlan steps = plan(offset(resolved), input.grid);
+                resolved["step_mm"] = steps.step_mm;
+                resolved["steps"] = static_cast<double>(steps.steps);
+                return resolved;
+              },
+          .run = [](Volume& volume, const ParameterValues& resolved,
+                    const Progress& report) { smooth_as_asked(volume, offset(resolved), resolved, report); },
+          .extra_bytes_per_voxel = sizeof(float)};
+}
+
+Sharpening sharpening(const ParameterValues& resolved) {
+  return {.reach_mm = number(resolved, "reach_mm")};
+}
+
+Method sharpening_method() {
+  ParameterInfo surface = surface_parameter();
+  surface.description = "The isovalue of the surface to sharpen: the volume becomes a density around it.";
+  surface.default_text = "none: it must be given";
+  surface.required = true;
+  ParameterInfo reach{.name = "reach_mm",
+                      .description =
+                          "How far the isosurfaces at the ends of the density move towards the "
+                          "surface at the most.",
+                      .unit = "mm",
+                      .minimum = 1e-6,
+                      .maximum = 2000,
+                      .default_text = "three times the geometric mean of the spacing"};
+  return {
+      .info = {.name = "sharpening",
+               .description = "Gathers the isosurfaces around one of them and keeps the mass: blurred "
+                              "edges become steep, and its volume becomes what the mass says.",
+               .parameters = {std::move(surface), half_width_parameter(), std::move(reach)}},
+      .resolve =
+          [](const ParameterValues& asked, const MethodInput& input) {
+            ParameterValues resolved;
+            resolve_surface(resolved, asked, input);
+            resolved["reach_mm"] = number(asked, "reach_mm", 3 * mean_spacing(input.grid));
+            const SharpeningPlan steps = plan(sharpening(resolved), input.grid);
+            resolved["step_mm"] = steps.step_mm;
+            resolved["steps"] = static_cast<double>(steps.steps);
+            return resolved;
+          },
+      .run = [](Volume& volume, const ParameterValues& resolved,
+                const Progress& report) { smooth_as_asked(volume, sharpening(resolved), resolved, report); },
+      .extra_bytes_per_voxel = kSharpeningBytesPerVoxel};
+}
+
 std::vector<Method> make_catalog() {
-  return {flow_method<MeanCurvatureFlow>("mean-curvature-flow",
-                                         "Moves every isosurface along its normal at the speed of its mean "
-                                         "curvature: small features and noise vanish, edges stay sharp."),
-          flow_method<Laplacian>("laplacian",
-                                 "The heat equation, a Gaussian of variance twice the flow time: smooths "
-                                 "across edges as well as along them."),
-          {.info = {.name = "compare",
-                    .description = "Mean curvature flow and Laplacian of the same strength side by side, "
-                                   "with the surfaces of the original beside them.",
-                    .parameters = strength_parameters(),
-                    .parts = {"mean-curvature-flow", "laplacian"}},
-           .resolve = resolve_strength}};
+  return {
+      flow_method("mean-curvature-flow",
+                  "Moves every isosurface along its normal at the speed of its mean curvature: small "
+                  "features and noise vanish, edges stay sharp.",
+                  {choice_parameter("scheme",
+                                    "How curvature and gradient are discretised: 'face-centred' is of second "
+                                    "order, 'thesis' that of the method's source.",
+                                    mean_curvature_schemes()),
+                   surface_parameter(), half_width_parameter()},
+                  mean_curvature_flow),
+      flow_method("conservative-mean-curvature-flow",
+                  "Mean curvature flow from which the mean speed is taken off, so that the mass of the "
+                  "whole volume does not change: noise goes, sizes stay.",
+                  {surface_parameter(), half_width_parameter()}, conservative_flow),
+      flow_method("laplacian",
+                  "The heat equation, a Gaussian of variance twice the flow time: smooths across edges as "
+                  "well as along them.",
+                  {}, laplacian),
+      {.info = {.name = "compare",
+                .description = "Mean curvature flow and Laplacian of the same strength side by side, "
+                               "with the surfaces of the original beside them.",
+                .parameters = strength_parameters(),
+                .parts = {"mean-curvature-flow", "laplacian"}},
+       .resolve = resolve_strength},
+      offset_method(),
+      sharpening_method()};
 }
 
 }  // namespace

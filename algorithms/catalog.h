@@ -9,13 +9,19 @@
 
 namespace volsmooth {
 
+/// What parameters are resolved for.
+struct MethodInput {
+  Grid grid;
+  double intensity_min = 0, intensity_max = 1;  ///< of the valid voxels
+};
+
 /// One row of the catalogue: what is declared outside, and what runs.
 struct Method {
   MethodInfo info;
 
   /// Resolves parameters that were checked against `info.parameters` into all that `run` will do: defaults
-  /// filled in from the grid, `flow_time_mm2`, `feature_radius_mm`, `step_mm2`, `steps`.
-  std::function<ParameterValues(const ParameterValues& asked, const Grid& grid)> resolve = {};
+  /// filled in from the input, `flow_time_mm2`, `feature_radius_mm`, `step_mm2`, `steps`.
+  std::function<ParameterValues(const ParameterValues& asked, const MethodInput& input)> resolve = {};
 
   /// Transforms `volume` in place; takes what `resolve` gave. Empty for a method that is made of `parts`.
   std::function<void(Volume& volume, const ParameterValues& resolved, const Progress& report)> run = {};

@@ -17,13 +17,16 @@ using ParameterValues = std::map<std::string, ParameterValue>;
 struct ParameterInfo {
   std::string name;                                  ///< ends in its unit, such as `flow_time_mm2`
   std::string description;                           ///< one sentence for the person who sets it
-  std::string unit;                                  ///< "mm", "mm^2", or empty
+  std::string unit;                                  ///< "mm", "mm^2", "intensity", or empty
   double minimum = 0;                                ///< inclusive; numbers only
   double maximum = 0;                                ///< inclusive; numbers only
   std::vector<std::string> choices = {};             ///< not empty: a text parameter that takes one of these
   std::optional<ParameterValue> default_value = {};  ///< none: see `default_text`
   std::string default_text = {};                     ///< how the default follows from the volume, in words
   std::string excludes = {};  ///< name of the parameter that may not be given beside this one
+  std::string needs = {};     ///< name of the parameter without which this one says nothing
+  bool required = false;
+  bool is_isovalue = false;  ///< within the intensities of the volume, whatever `minimum` and `maximum`
 };
 
 /// Declares one method of the catalogue.

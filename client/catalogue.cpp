@@ -15,6 +15,7 @@ std::string range_of(const Json& parameter) {
     for (const Json& choice : *choices) text += (text.empty() ? "one of " : ", ") + text_of(choice);
     return text;
   }
+  if (!parameter.contains("minimum")) return "within the volume's intensities";
   const std::string unit = member_text(parameter, "unit");
   return member_text(parameter, "minimum") + " to " + member_text(parameter, "maximum") +
          (unit.empty() ? "" : ' ' + unit);
@@ -27,6 +28,7 @@ std::string parameter_text(const Json& parameter) {
   if (const std::string& usual = value.empty() ? words : value; !usual.empty()) text += "; default " + usual;
   if (const std::string other = member_text(parameter, "excludes"); !other.empty())
     text += "; not with " + other;
+  if (const std::string other = member_text(parameter, "needs"); !other.empty()) text += "; with " + other;
   return text + ")\n      " + member_text(parameter, "description") + '\n';
 }
 

@@ -34,13 +34,17 @@ json to_json(const ParameterInfo& info) {
                    {"description", info.description},
                    {"unit", or_null(info.unit)},
                    {"default", info.default_value ? to_json(*info.default_value) : json(nullptr)}};
-  if (info.choices.empty()) {
+  if (info.is_isovalue) {
+    document.update({{"type", "number"}});
+  } else if (info.choices.empty()) {
     document.update({{"type", "number"}, {"minimum", info.minimum}, {"maximum", info.maximum}});
   } else {
     document.update({{"type", "string"}, {"choices", info.choices}});
   }
   if (!info.default_text.empty()) document["default_text"] = info.default_text;
   if (!info.excludes.empty()) document["excludes"] = info.excludes;
+  if (!info.needs.empty()) document["needs"] = info.needs;
+  if (info.required) document["required"] = true;
   return document;
 }
 

@@ -240,10 +240,15 @@ Checked check_parameters(const ParameterValues& parameters, const MethodInfo& me
     if (info == method.parameters.end()) return unknown(name, joined(names));
     if (!info->excludes.empty() && parameters.contains(info->excludes))
       return bad(name, "given without '" + info->excludes + "': the two say the same thing");
+    if (!info->needs.empty() && !parameters.contains(info->needs))
+      return bad(name, "given together with '" + info->needs + "', without which it says nothing");
     if (auto checked = info->choices.empty() ? check_number(*info, value) : check_choice(*info, value);
         !checked)
       return checked;
   }
+  for (const ParameterInfo& info : method.parameters)
+    if (info.required && !parameters.contains(info.name))
+      return bad(info.name, "given for " + method.name + ": " + limits_text(info));
   return {};
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "algorithms/catalog.h"
@@ -13,14 +14,17 @@ struct Part {
   ParameterValues parameters;
 };
 
-/// The grid of a stored volume, angles included.
-Grid grid_of(const VolumeFacts& volume);
+/// What methods need to know of a stored volume.
+MethodInput input_of(const VolumeFacts& volume);
 
 /// The row of the catalogue called `name`. Throws std::logic_error: an order was checked long before.
 const Method& method_called(const std::string& name);
 
 /// The methods behind `order`, which resolve to `resolved` as a whole: the one that it names, or its parts.
-std::vector<Part> parts_of(const JobOrder& order, const ParameterValues& resolved, const Grid& grid);
+std::vector<Part> parts_of(const JobOrder& order, const ParameterValues& resolved, const MethodInput& input);
+
+/// Whether the order speaks of a single surface, and which.
+std::optional<double> surface_of(const ParameterValues& parameters);
 
 /// Passes over the volume: 1 for a method that does not count its steps.
 double steps_of(const Part& part);

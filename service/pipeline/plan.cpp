@@ -18,19 +18,55 @@ constexpr double kBytesPerVoxelOfSurface = 11;
 
 constexpr std::int64_t kFixedBytes = std::int64_t{64} << 20;
 
+tl::expected<void, Problem> check_isovalue(const std::string& member, double isovalue,
+                                           const VolumeFacts& volume) {
+  if (isovalue >= volume.intensity_min && isovalue <= volume.intensity_max) return {};
+  return tl::unexpected(Problem{
+      "bad-parameter",
+      "'" + member +
+          "' has a value outside the volume's intensities, where there is no surface; give values from " +
+          isovalue_text(volume.intensity_min) + " to " + isovalue_text(volume.intensity_max) +
+          " in the volume's own units.",
+      {{"member", member}, {"minimum", volume.intensity_min}, {"maximum", volume.intensity_max}}});
+}
+
 tl::expected<void, Problem> check_isovalues(const JobOrder& order, const VolumeFacts& volume) {
-  if (!order.isovalues) return {};
-  for (const double isovalue : *order.isovalues) {
-    if (isovalue >= volume.intensity_min && isovalue <= volume.intensity_max) continue;
-    return tl::unexpected(Problem{
-        "bad-parameter",
-        "`isovalues` has a value outside the volume's intensities, where there is no surface; give values "
-        "from " +
-            isovalue_text(volume.intensity_min) + " to " + isovalue_text(volume.intensity_max) +
-            " in the volume's own units.",
-        {{"member", "isovalues"}, {"minimum", volume.intensity_min}, {"maximum", volume.intensity_max}}});
+  if (order.isovalues) {
+    for (const double isovalue : *order.isovalues)
+      if (auto checked = check_isovalue("isovalues", isovalue, volume); !checked) return checked;
+  }
+  for (const ParameterInfo& info : method_called(order.method).info.parameters) {
+    const auto asked = order.parameters.find(info.name);
+    if (!info.is_isovalue || asked == order.parameters.end()) continue;
+    if (auto checked = check_isovalue(info.name, std::get<double>(asked->second), volume); !checked)
+      return checked;
   }
   return {};
+}
+
+/// The length of the voxels' box, corner to corner, is at most the sum of its sides.
+tl::expected<void, Problem> check_distance(const ParameterValues& resolved, const MethodInput& input) {
+  const auto distance = resolved.find("distance_mm");
+  if (distance == resolved.end()) return {};
+  double sides = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    sides += static_cast<double>(input.grid.size[axis]) * input.grid.spacing_mm[axis];
+  if (std::abs(std::get<double>(distance->second)) <= sides) return {};
+  return tl::unexpected(
+      Problem{"bad-parameter",
+              "'distance_mm' is longer than the volume; nothing would be left of it.",
+              {{"member", "distance_mm"}, {"minimum", -sides}, {"maximum", sides}, {"unit", "mm"}}});
+}
+
+tl::expected<void, Problem> check_scheme(const ParameterValues& asked, const MethodInput& input) {
+  const auto scheme = asked.find("scheme");
+  if (scheme == asked.end() || is_orthogonal(input.grid) ||
+      std::get<std::string>(scheme->second) == "face-centred")
+    return {};
+  return tl::unexpected(
+      Problem{"bad-parameter",
+              "'scheme' must be face-centred for this volume: its axes do not meet at right angles.",
+              {{"member", "scheme"}, {"choices", {"face-centred"}}}});
 }
 
 }  // namespace
@@ -39,13 +75,17 @@ tl::expected<JobPlan, Problem> plan_job(const JobOrder& order, const VolumeFacts
                                         const PipelineLimits& limits) {
   if (const auto checked = check_isovalues(order, volume); !checked) return tl::unexpected(checked.error());
 
-  const Grid grid = grid_of(volume);
-  const auto voxels = static_cast<double>(voxel_count(grid.size));
+  const MethodInput input = input_of(volume);
+  if (const auto checked = check_scheme(order.parameters, input); !checked)
+    return tl::unexpected(checked.error());
+  const auto voxels = static_cast<double>(voxel_count(input.grid.size));
   JobPlan plan;
-  plan.parameters = method_called(order.method).resolve(order.parameters, grid);
+  plan.parameters = method_called(order.method).resolve(order.parameters, input);
+  if (const auto checked = check_distance(plan.parameters, input); !checked)
+    return tl::unexpected(checked.error());
 
   double steps = 0, extra_bytes_per_voxel = 0;
-  const std::vector<Part> parts = parts_of(order, plan.parameters, grid);
+  const std::vector<Part> parts = parts_of(order, plan.parameters, input);
   for (const Part& part : parts) {
     steps += steps_of(part);
     extra_bytes_per_voxel = std::max(extra_bytes_per_voxel, part.method->extra_bytes_per_voxel);

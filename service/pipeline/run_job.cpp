@@ -37,7 +37,7 @@ class JobRun {
  public:
   JobRun(const ComputeTask& task, const StageProgress& report, const PipelineLimits& limits)
       : task_(task),
-        parts_(parts_of(task.order, task.parameters, grid_of(task.volume.facts))),
+        parts_(parts_of(task.order, task.parameters, input_of(task.volume.facts))),
         limits_(limits),
         surface_bytes_(limits.max_memory_bytes / 4),
         voxels_(static_cast<double>(voxel_count(task.volume.facts.size))),
@@ -73,14 +73,19 @@ class JobRun {
                [&](const Progress& progress) { original_foliation_ = measure(*original_, progress); });
     clock_.run("surfaces", kMeasureCost * voxels_, [&](const Progress& progress) {
       original_slices_ = middle_slices(*original_, description_.map);
-      isovalues_ = task_.order.isovalues
-                       ? *task_.order.isovalues
-                       : std::vector{otsu_threshold(*original_, progress, description_.padding_value)};
+      isovalues_ = isovalues_of_order(progress);
     });
     original_surfaces_ = surfaces_of(*original_);
     clock_.run("surfaces", 0, [&](const Progress& progress) {
       for (const Mesh& surface : original_surfaces_) original_measures_.push_back(measure(surface, progress));
     });
+  }
+
+  /// "auto" is the surface that the order speaks of, or Otsu's threshold.
+  std::vector<double> isovalues_of_order(const Progress& progress) {
+    if (task_.order.isovalues) return *task_.order.isovalues;
+    if (const auto surface = surface_of(task_.parameters)) return {*surface};
+    return {otsu_threshold(*original_, progress, description_.padding_value)};
   }
 
   std::vector<Mesh> surfaces_of(const Volume& volume) {

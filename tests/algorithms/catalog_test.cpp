@@ -9,16 +9,31 @@ namespace volsmooth {
 namespace {
 
 const Grid kGrid{{12, 11, 10}, {1, 1, 2.5}};
+const MethodInput kInput{kGrid, 0, 1};
 
 double number(const ParameterValues& values, const std::string& name) {
   return std::get<double>(values.at(name));
 }
 
+bool declares(const Method& method, const std::string& name) {
+  return std::ranges::find(method.info.parameters, name, &ParameterInfo::name) !=
+         method.info.parameters.end();
+}
+
+/// The least that can be asked for.
+ParameterValues bare_order(const Method& method) {
+  ParameterValues asked;
+  for (const ParameterInfo& parameter : method.info.parameters)
+    if (parameter.required) asked[parameter.name] = parameter.is_isovalue ? 0.5 : 1.0;
+  return asked;
+}
+
 TEST(Catalog, OffersTheMethodsInOrder) {
   std::vector<std::string> names;
   for (const Method& method : catalog()) names.push_back(method.info.name);
-  EXPECT_EQ(names, (std::vector<std::string>{"mean-curvature-flow", "laplacian", "compare"}));
-  EXPECT_EQ(find_method("compare"), &catalog()[2]);
+  EXPECT_EQ(names, (std::vector<std::string>{"mean-curvature-flow", "conservative-mean-curvature-flow",
+                                             "laplacian", "compare", "offset", "sharpening"}));
+  EXPECT_EQ(find_method("compare"), &catalog()[3]);
   EXPECT_EQ(find_method("Compare"), nullptr);
 }
 
@@ -35,11 +50,14 @@ TEST_P(CatalogRow, EitherRunsOrNamesPartsThatRun) {
   }
 }
 
-TEST_P(CatalogRow, DeclaresParametersThatExcludeEachOtherBothWays) {
+TEST_P(CatalogRow, DeclaresParametersThatSayWhatTheyAre) {
   for (const ParameterInfo& parameter : method().info.parameters) {
-    EXPECT_LT(parameter.minimum, parameter.maximum);
     EXPECT_FALSE(parameter.description.empty());
-    EXPECT_TRUE(parameter.default_value || !parameter.default_text.empty());
+    EXPECT_TRUE(parameter.default_value || !parameter.default_text.empty()) << parameter.name;
+    EXPECT_TRUE(parameter.minimum < parameter.maximum || !parameter.choices.empty()) << parameter.name;
+    if (!parameter.needs.empty()) {
+      EXPECT_TRUE(declares(method(), parameter.needs));
+    }
     if (parameter.excludes.empty()) continue;
     const auto other = std::ranges::find(method().info.parameters, parameter.excludes, &ParameterInfo::name);
     ASSERT_NE(other, method().info.parameters.end());
@@ -48,53 +66,90 @@ TEST_P(CatalogRow, DeclaresParametersThatExcludeEachOtherBothWays) {
 }
 
 TEST_P(CatalogRow, TurnsARadiusIntoAQuarterOfItsSquareAndBack) {
-  const auto by_radius = method().resolve({{"feature_radius_mm", 3.0}}, kGrid);
+  if (!declares(method(), "feature_radius_mm")) return;
+  const auto by_radius = method().resolve({{"feature_radius_mm", 3.0}}, kInput);
   EXPECT_DOUBLE_EQ(number(by_radius, "flow_time_mm2"), 2.25);
   EXPECT_DOUBLE_EQ(number(by_radius, "feature_radius_mm"), 3);
-  const auto by_time = method().resolve({{"flow_time_mm2", 4.0}}, kGrid);
+  const auto by_time = method().resolve({{"flow_time_mm2", 4.0}}, kInput);
   EXPECT_DOUBLE_EQ(number(by_time, "flow_time_mm2"), 4);
   EXPECT_DOUBLE_EQ(number(by_time, "feature_radius_mm"), 4);
-}
-
-TEST_P(CatalogRow, DefaultsToTwiceTheGeometricMeanSpacing) {
-  EXPECT_DOUBLE_EQ(number(method().resolve({}, kGrid), "feature_radius_mm"), 2 * std::cbrt(2.5));
+  EXPECT_DOUBLE_EQ(number(method().resolve({}, kInput), "feature_radius_mm"), 2 * std::cbrt(2.5));
 }
 
 /// From 10 nm, voxels of an electron microscope, to those of a survey of the ground.
 TEST_P(CatalogRow, AcceptsItsOwnDefaultsForVoxelsOfAnySize) {
   for (const double spacing : {1e-5, 5e-4, 1e-3, 1.0, 500.0}) {
-    const auto defaults = method().resolve({}, Grid{{8, 8, 8}, {spacing, spacing, spacing}});
+    const auto resolved =
+        method().resolve(bare_order(method()), {Grid{{8, 8, 8}, {spacing, spacing, spacing}}, 0, 1});
     for (const ParameterInfo& parameter : method().info.parameters) {
-      EXPECT_GE(number(defaults, parameter.name), parameter.minimum) << spacing << " " << parameter.name;
-      EXPECT_LE(number(defaults, parameter.name), parameter.maximum) << spacing << " " << parameter.name;
+      if (!resolved.contains(parameter.name) || !parameter.choices.empty()) continue;
+      EXPECT_GE(number(resolved, parameter.name), parameter.minimum) << spacing << " " << parameter.name;
+      EXPECT_LE(number(resolved, parameter.name), parameter.maximum) << spacing << " " << parameter.name;
     }
   }
 }
 
-TEST_P(CatalogRow, HasLimitsThatExcludeAbsurdStrengths) {  // P1
+TEST_P(CatalogRow, HasLimitsThatExcludeAbsurdLengths) {  // P1, P2
   for (const ParameterInfo& parameter : method().info.parameters) {
-    EXPECT_GT(parameter.minimum, 1e-300);
+    if (!parameter.unit.starts_with("mm")) continue;
+    EXPECT_TRUE(parameter.minimum > 1e-300 || parameter.minimum == -parameter.maximum) << parameter.name;
     EXPECT_LT(parameter.maximum, 1e9);
   }
 }
 
 TEST_P(CatalogRow, ResolvesWhatItResolvedToTheSame) {
-  const auto once = method().resolve({}, kGrid);
-  EXPECT_EQ(number(method().resolve(once, kGrid), "flow_time_mm2"), number(once, "flow_time_mm2"));
+  const auto once = method().resolve(bare_order(method()), kInput);
+  EXPECT_EQ(method().resolve(once, kInput), once);
 }
 
 TEST_P(CatalogRow, SaysTheStepsItWillTake) {
   if (!method().run) return;
-  const auto resolved = method().resolve({{"flow_time_mm2", 4.0}}, kGrid);
-  EXPECT_DOUBLE_EQ(number(resolved, "steps") * number(resolved, "step_mm2"), 4);
+  const auto resolved = method().resolve(bare_order(method()), kInput);
+  EXPECT_GE(number(resolved, "steps"), 1);
+  if (declares(method(), "flow_time_mm2")) {
+    EXPECT_DOUBLE_EQ(number(resolved, "steps") * number(resolved, "step_mm2"),
+                     number(resolved, "flow_time_mm2"));
+  }
 }
 
-TEST_P(CatalogRow, SmoothsNoise) {
+TEST_P(CatalogRow, ChangesNoiseAndKeepsItsRange) {
   if (!method().run) return;
   const auto before = noise(kGrid.size, 1);
   auto volume = volume_of(kGrid, before);
-  method().run(*volume, method().resolve({}, kGrid), no_progress);
-  EXPECT_LT(std::ranges::max(values_of(*volume)) - std::ranges::min(values_of(*volume)), 0.8F);
+  method().run(*volume, method().resolve(bare_order(method()), kInput), no_progress);
+  const auto after = values_of(*volume);
+  EXPECT_NE(after, before);
+  EXPECT_GE(std::ranges::min(after), std::ranges::min(before));
+  EXPECT_LE(std::ranges::max(after), std::ranges::max(before));
+}
+
+/// Around the surface everything goes on as before; far from it there is nothing to be seen.
+TEST_P(CatalogRow, InSingleSurfaceModeFlattensWhatIsFarFromTheSurface) {
+  if (!method().run || !declares(method(), "surface")) return;
+  ParameterValues asked = bare_order(method());
+  asked["surface"] = 500.0;
+  asked["half_width"] = 100.0;
+  const Grid grid{{16, 16, 16}, {1, 1, 1}};
+  auto volume = volume_of(grid, sampled(grid, nested_spheres(grid, soft_step(5, 2, 1000))));
+  method().run(*volume, method().resolve(asked, {grid, 0, 1000}), no_progress);
+  EXPECT_EQ(std::ranges::min(values_of(*volume)), 400);
+  EXPECT_LE(std::ranges::max(values_of(*volume)), 600);
+}
+
+/// Every choice of every parameter runs, and no two of a parameter do the same.
+TEST_P(CatalogRow, OffersChoicesThatDiffer) {
+  if (!method().run) return;
+  for (const ParameterInfo& parameter : method().info.parameters) {
+    std::vector<std::vector<float>> results;
+    for (const std::string& choice : parameter.choices) {
+      ParameterValues asked = bare_order(method());
+      asked[parameter.name] = choice;
+      auto volume = volume_of(kGrid, noise(kGrid.size, 1));
+      method().run(*volume, method().resolve(asked, kInput), no_progress);
+      EXPECT_EQ(std::ranges::count(results, values_of(*volume)), 0) << parameter.name << " " << choice;
+      results.push_back(values_of(*volume));
+    }
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(All, CatalogRow, testing::Range<std::size_t>(0, catalog().size()));
@@ -102,7 +157,7 @@ INSTANTIATE_TEST_SUITE_P(All, CatalogRow, testing::Range<std::size_t>(0, catalog
 TEST(Catalog, RunsMeanCurvatureFlowUnderItsName) {
   auto by_name = volume_of(kGrid, noise(kGrid.size, 1)), directly = copy_of(*by_name);
   const Method& method = *find_method("mean-curvature-flow");
-  method.run(*by_name, method.resolve({{"flow_time_mm2", 2.0}}, kGrid), no_progress);
+  method.run(*by_name, method.resolve({{"flow_time_mm2", 2.0}}, kInput), no_progress);
   smooth(*directly, MeanCurvatureFlow{2});
   EXPECT_EQ(values_of(*by_name), values_of(*directly));
 }

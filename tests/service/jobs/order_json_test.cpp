@@ -120,6 +120,33 @@ std::string named_row(const testing::TestParamInfo<OrderRow>& row) {
 
 INSTANTIATE_TEST_SUITE_P(Table, RefusedOrder, testing::ValuesIn(kRefused), named_row);
 
+TEST(RefusedOrder, LacksAParameterThatAnotherNeedsOrThatMustBeGiven) {
+  const MethodInfo method{
+      .name = "offset",
+      .description = "",
+      .parameters = {
+          {.name = "distance_mm",
+           .description = "",
+           .unit = "mm",
+           .minimum = -5,
+           .maximum = 5,
+           .required = true},
+          {.name = "surface", .description = "", .unit = "intensity", .minimum = -1e9, .maximum = 1e9},
+          {.name = "half_width",
+           .description = "",
+           .unit = "",
+           .minimum = 0,
+           .maximum = 9,
+           .needs = "surface"}}};
+  const auto missing_in = [&](const ParameterValues& parameters) -> std::string {
+    const auto checked = check_parameters(parameters, method);
+    return checked ? "" : checked.error().members.at("member");
+  };
+  EXPECT_EQ(missing_in({{"surface", 1.0}}), "distance_mm");
+  EXPECT_EQ(missing_in({{"distance_mm", 1.0}, {"half_width", 1.0}}), "half_width");
+  EXPECT_EQ(missing_in({{"distance_mm", 1.0}, {"half_width", 1.0}, {"surface", 1.0}}), "");
+}
+
 TEST(RefusedOrder, NamesUnitAndLimits) {
   const Problem problem = outcome_of(parameters(R"("feature_radius_mm": 201)")).error();
   EXPECT_EQ(problem.members,

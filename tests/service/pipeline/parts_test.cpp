@@ -7,7 +7,7 @@
 namespace volsmooth {
 namespace {
 
-constexpr Grid kGrid{{64, 64, 64}, {1, 1, 1}};
+const MethodInput kInput{Grid{{64, 64, 64}, {1, 1, 1}}};
 
 JobOrder order(const std::string& method) {
   JobOrder order;
@@ -18,17 +18,17 @@ JobOrder order(const std::string& method) {
 
 TEST(Parts, AMethodRunsWithWhatItWasResolvedTo) {
   const ParameterValues resolved = {{"steps", 7.0}};
-  const auto parts = parts_of(order("laplacian"), resolved, kGrid);
+  const auto parts = parts_of(order("laplacian"), resolved, kInput);
   ASSERT_EQ(parts.size(), 1u);
   EXPECT_EQ(parts[0].method, find_method("laplacian"));
   EXPECT_EQ(parts[0].parameters, resolved);
 }
 
 TEST(Parts, EachPartOfCompareHasItsOwnSteps) {
-  const auto parts = parts_of(order("compare"), {}, kGrid);
+  const auto parts = parts_of(order("compare"), {}, kInput);
   ASSERT_EQ(parts.size(), 2u);
   for (const Part& part : parts) {
-    EXPECT_EQ(part.parameters, part.method->resolve({{"flow_time_mm2", 4.0}}, kGrid));
+    EXPECT_EQ(part.parameters, part.method->resolve({{"flow_time_mm2", 4.0}}, kInput));
     EXPECT_EQ(steps_of(part), std::get<double>(part.parameters.at("steps"))) << part.method->info.name;
   }
   EXPECT_NE(parts[0].method, parts[1].method);
@@ -39,7 +39,7 @@ TEST(Parts, AMethodThatDoesNotCountPassesOnce) {
 }
 
 TEST(Parts, AnOrderForAMethodThatIsNotThereIsABrokenPromise) {
-  EXPECT_THROW(parts_of(order("magic"), {}, kGrid), std::logic_error);
+  EXPECT_THROW(parts_of(order("magic"), {}, kInput), std::logic_error);
 }
 
 }  // namespace

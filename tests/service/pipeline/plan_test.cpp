@@ -93,6 +93,47 @@ TEST(Plan, AJobThatNeedsTooMuchMemoryIsRefusedWithBothNumbers) {
   EXPECT_GT(plan.error().members.at("estimate_bytes"), plan.error().members.at("limit_bytes"));
 }
 
+TEST(Plan, ASurfaceOutsideTheVolumeIsRefusedWithTheRange) {
+  JobOrder asked = order("conservative-mean-curvature-flow", 1);
+  asked.parameters["surface"] = 3001.0;
+  const auto plan = plan_job(asked, head(), {});
+  ASSERT_FALSE(plan);
+  EXPECT_EQ(plan.error().members.at("member"), "surface");
+  EXPECT_EQ(plan.error().members.at("maximum"), 3000);
+}
+
+TEST(Plan, TheDensityAroundASurfaceIsATenthOfTheRangeWideByDefault) {
+  JobOrder asked = order("mean-curvature-flow", 1);
+  asked.parameters["surface"] = 300.0;
+  const auto plan = plan_job(asked, head(), {});
+  ASSERT_TRUE(plan);
+  EXPECT_NEAR(number(*plan, "half_width"), 402.4, 1e-9);
+}
+
+TEST(Plan, AnOffsetLongerThanTheVolumeIsRefused) {
+  JobOrder asked;
+  asked.method = "offset";
+  asked.parameters["distance_mm"] = -100.0;
+  EXPECT_TRUE(plan_job(asked, head(64), {}));
+  asked.parameters["distance_mm"] = -200.0;
+  const auto plan = plan_job(asked, head(64), {});
+  ASSERT_FALSE(plan);
+  EXPECT_EQ(plan.error().members.at("member"), "distance_mm");
+}
+
+/// The sheared 20 degrees of which the thesis' own scheme knows nothing.
+TEST(Plan, TheThesisSchemeIsRefusedOnSkewAxes) {
+  VolumeFacts sheared = head();
+  sheared.affine = {{{1, 0, 0.36, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}};
+  JobOrder asked = order("mean-curvature-flow", 1);
+  EXPECT_TRUE(plan_job(asked, sheared, {}));
+  asked.parameters["scheme"] = "thesis";
+  EXPECT_TRUE(plan_job(asked, head(), {}));
+  const auto plan = plan_job(asked, sheared, {});
+  ASSERT_FALSE(plan);
+  EXPECT_EQ(plan.error().members.at("member"), "scheme");
+}
+
 TEST(Plan, CompareCostsItsPartsTogether) {
   PipelineLimits limits;
   const auto flow = plan_job(order("mean-curvature-flow", 25), head(), limits);
