@@ -1,7 +1,7 @@
 #include "algorithms/flows/sharpening_sweep.h"
 
 #include "algorithms/flows/balanced_rows.h"
-#include "algorithms/flows/grid_metric.h"
+#include "algorithms/flows/upwind_metric.h"
 #include "algorithms/numerics/sharpening.h"
 
 namespace volsmooth {
@@ -15,7 +15,7 @@ VOLSMOOTH_FORMULA void sharpen_row(const BalancedRow<Metric>& row) {
 }
 
 using OrthogonalRow = BalancedRow<OrthogonalMetric<float>>;
-using AnyRow = BalancedRow<AnyMetric<float>>;
+using AnyRow = BalancedRow<AnyUpwindMetric<float>>;
 
 VOLSMOOTH_FORMULA void orthogonal(const OrthogonalRow& row) {
   sharpen_row(row);
@@ -29,7 +29,7 @@ VOLSMOOTH_ROW_KERNEL(skew, AnyRow)
 auto kernel_for(const OrthogonalMetric<float>&, InstructionSet set) {
   return orthogonal_for(set);
 }
-auto kernel_for(const AnyMetric<float>&, InstructionSet set) {
+auto kernel_for(const AnyUpwindMetric<float>&, InstructionSet set) {
   return skew_for(set);
 }
 
@@ -39,7 +39,7 @@ BalancedMass sharpening_step(std::span<const float> from, std::span<float> to, c
                              double step_mm, float constant, InstructionSet set, const TileShape& shape,
                              const Progress& report) {
   BalancedMass sums;
-  with_metric<float>(grid, [&](const auto& metric) {
+  with_upwind_metric<float>(grid, [&](const auto& metric) {
     const BalancedRow<std::decay_t<decltype(metric)>> row{
         .metric = metric, .constant = constant, .time = static_cast<float>(step_mm / unit_of(grid))};
     sums = balance_rows(from, to, grid.size, row, kernel_for(metric, set), shape, report);

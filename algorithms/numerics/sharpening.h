@@ -22,24 +22,6 @@ VOLSMOOTH_FORMULA Scalar sharpening_speed(Scalar rho, Scalar jump) {
   return off * off * off * (Scalar{1} - std::min(Scalar{1}, jump * kOfJump));
 }
 
-/// |grad rho|+ (`direction` = 1) or |grad rho|- (-1) from differences to the six neighbours.
-template <class Scalar>
-VOLSMOOTH_FORMULA Scalar gradient_against(Scalar direction, const Neighbours<Scalar>& differences,
-                                          const OrthogonalMetric<Scalar>& metric) {
-  return upwind_gradient(direction, Scalar{0}, differences, metric.inverse_spacing);
-}
-
-/// On skew axes the central difference for both.
-template <class Scalar>
-VOLSMOOTH_FORMULA Scalar gradient_against(Scalar, const Neighbours<Scalar>& differences,
-                                          const AnyMetric<Scalar>& metric) {
-  std::array<Scalar, 3> central;
-  unrolled<3>([&](auto e) VOLSMOOTH_INLINE {
-    central[e] = Scalar{0.5} * (differences.after[e] - differences.before[e]);
-  });
-  return std::sqrt(square_of(metric.gradient(central)));
-}
-
 /// rho + dt (w - constant) |grad rho|, upwind (thesis, Eq. 6.8), held between the least and the largest of
 /// the voxel and its six neighbours. `rho(offset)` is the 3^3 neighbourhood.
 template <class Scalar, class Metric, class Rho>
@@ -47,17 +29,17 @@ VOLSMOOTH_FORMULA BalancedMove<Scalar> sharpened(const Rho& rho, const Metric& m
                                                  Scalar time) {
   const Scalar here = rho(VoxelOffset{0, 0, 0});
   FaceCentredRate<Scalar> rate{.speed = 0, .gradient = 0, .lowest = here, .highest = here};
-  Neighbours<Scalar> differences;
+  Neighbours<Scalar> gains;
   unrolled<3>([&](auto e) VOLSMOOTH_INLINE {
     const Scalar before = rho(moved_along({0, 0, 0}, e, -1)), after = rho(moved_along({0, 0, 0}, e, 1));
     rate.include(before);
     rate.include(after);
-    differences.before[e] = before - here;
-    differences.after[e] = after - here;
+    gains.before[e] = before - here;
+    gains.after[e] = after - here;
   });
   rate.speed = sharpening_speed(here, std::max(rate.highest - here, here - rate.lowest));
   const Scalar direction = rate.speed > constant ? Scalar{1} : Scalar{-1};
-  rate.gradient = gradient_against(direction, differences, metric);
+  rate.gradient = upwind_gradient<UpwindGradient::kGodunov>(direction, gains, metric);
   return balanced(here, rate, constant, time);
 }
 

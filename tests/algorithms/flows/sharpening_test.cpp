@@ -8,6 +8,7 @@
 #include "algorithms/flows/plain_balanced_steps.h"
 #include "algorithms/volume/functionals.h"
 #include "tests/support/phantoms.h"
+#include "tests/support/world_phantoms.h"
 
 namespace volsmooth {
 namespace {
@@ -104,6 +105,21 @@ TEST(Sharpening, KeepsTheRangeAndTheMassOfAnyData) {
       EXPECT_NEAR(mass_of(after).sum / mass_of(before).sum, 1, 1e-7);
     }
   }
+}
+
+/// A ball gains the same deviation, in mm^3, whatever the axes it is sampled on.
+TEST(Sharpening, DoesTheSameOnSkewAxes) {
+  const auto gain_on = [](const Matrix3& axes, const Size3& size) {
+    const auto ball = test::sampled_in_world(size, test::centred_map(axes, size), [](const Vector3& x) {
+      return soft_step(10, 3)(test::norm(x));
+    });
+    const double before = deviation(*ball);
+    smooth(*ball, Sharpening{2});
+    return deviation(*ball) - before;
+  };
+  const double on_cubes = gain_on(test::scaling(1, 1, 1), {38, 38, 38});
+  const double on_skew = gain_on({{{1, 0.36, -0.2}, {0, 1, 0.3}, {0, 0, 1}}}, {56, 50, 38});
+  EXPECT_NEAR(on_skew / on_cubes, 1, 0.1);
 }
 
 /// A jump of 0.4 and more is sharp enough, and there is nothing else here.
