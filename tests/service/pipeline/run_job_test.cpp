@@ -205,8 +205,16 @@ TEST_F(RunJob, CanBeCancelledWithinEveryStage) {
   }
 }
 
+TEST_F(RunJob, AVerificationCanBeCancelled) {
+  const ComputeTask task = task_for(ball());
+  EXPECT_THROW(static_cast<void>(engine_.inspect(task.volume_file, {}, [](double) { throw Cancelled(); })),
+               Cancelled);
+}
+
 TEST_F(RunJob, TheReportSaysHowManyThreadsWereUsed) {
   ComputeTask task = task_for(ball());
+  task.order.parameters = {{"flow_time_mm2", 0.01}};
+  task.order.isovalues.emplace();
   for (const int threads : {1, 3}) {
     task.threads = threads;
     run(task);
