@@ -260,12 +260,24 @@ TEST_F(Api, TheCatalogueIsWhatOrdersAreHeldTo) {
   const json catalogue = service_.get("/v1/methods");
   for (const json& method : catalogue.at("methods")) {
     names.push_back(method.at("name"));
-    const HttpResponse answer = service_.try_submit(
-        {{"volume", volume_.at("id")}, {"method", names.back()}, {"isovalues", json::array()}});
+    json parameters = json::object();  // what must be given: an isovalue of the ball, or 1 of the unit
+    for (const json& parameter : method.at("parameters"))
+      if (parameter.value("required", false))
+        parameters[parameter.at("name").get<std::string>()] =
+            parameter.contains("minimum") ? json(1) : volume_.at("intensity").at("max");
+    json order = {{"volume", volume_.at("id")},
+                  {"method", names.back()},
+                  {"parameters", parameters},
+                  {"isovalues", json::array()}};
+    const HttpResponse answer = service_.try_submit(order);
     ASSERT_EQ(answer.status, 202) << answer.body;
     EXPECT_EQ(service_.wait(answer.document().at("id")).at("state"), "succeeded");
+    if (parameters.empty()) continue;
+    order.erase("parameters");
+    EXPECT_EQ(service_.try_submit(order).status, 422) << names.back() << " without what it needs";
   }
-  EXPECT_THAT(names, testing::IsSupersetOf({"mean-curvature-flow", "laplacian", "compare"}));
+  EXPECT_THAT(names, testing::IsSupersetOf({"mean-curvature-flow", "conservative-mean-curvature-flow",
+                                            "laplacian", "compare", "offset", "sharpening"}));
   EXPECT_THAT(service_.get("/v1/formats").dump(), testing::AllOf(HasSubstr("stl"), HasSubstr("glb")));
 }
 
