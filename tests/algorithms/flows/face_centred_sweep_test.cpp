@@ -98,9 +98,9 @@ class OnAnyGrid : public testing::TestWithParam<GridCase> {};
 
 INSTANTIATE_TEST_SUITE_P(Grids, OnAnyGrid,
                          testing::Values(GridCase{"Cubes", {{36, 36, 36}, {1, 1, 1}}},
-                                         GridCase{"OneToFive", {{180, 180, 36}, {0.2, 0.2, 1}}},
+                                         GridCase{"OneToFive", {{140, 140, 28}, {0.2, 0.2, 1}}},
                                          GridCase{"Sheared", {{44, 40, 40}, {1, 1, 1}, {0, kTilt, 0}}},
-                                         GridCase{"Tilted", {{72, 88, 40}, {0.5, 0.5, 1}, {kTilt, 0, 0}}},
+                                         GridCase{"Tilted", {{60, 72, 32}, {0.5, 0.5, 1}, {kTilt, 0, 0}}},
                                          GridCase{"Skew", {{44, 44, 44}, {1, 1, 1}, {-kTilt, kTilt, 0.1}}}),
                          [](const auto& row) { return std::string(row.param.name); });
 
@@ -131,10 +131,11 @@ TEST_P(OnAnyGrid, ABallShrinksByTheSameLaw) {
   EXPECT_GT(counted, 50U);
 }
 
-/// Planes with noise of 2 % stay where they are while the noise goes. In the middle half of the grid, which
-/// the border's mirror does not reach. 1.3 x the measured share of a fifth.
+/// Planes with noise of 2 % stay where they are while the noise goes. In the middle of the grid, which the
+/// border's mirror does not reach; half as many voxels along each axis will do.
 TEST_P(OnAnyGrid, NoisyObliquePlanesStayPut) {
-  const Grid& grid = GetParam().grid;
+  Grid grid = GetParam().grid;
+  for (std::int64_t& n : grid.size) n /= 2;
   const Vector3 centre = centre_of(grid), normal{0.48, -0.6, 0.64};
   const auto plane = [&](const Vector3& x) {
     double along = 0;
@@ -144,9 +145,11 @@ TEST_P(OnAnyGrid, NoisyObliquePlanesStayPut) {
   auto noisy = sampled(grid, plane);
   const auto disturbance = normal_noise(grid.size, 5);
   for (std::size_t voxel = 0; voxel < noisy.size(); ++voxel) noisy[voxel] += 0.02F * disturbance[voxel];
-  const auto middle = [&](const Vector3& x) { return distance(x, centre) < 4; };
-  const auto out = smoothed(grid, noisy, 4);
-  EXPECT_LT(rms_error(grid, out, plane, middle), 0.27 * rms_error(grid, noisy, plane, middle));
+  const auto middle = [&](const Vector3& x) { return distance(x, centre) < 3; };
+  const auto out = smoothed(grid, noisy, 1);
+  const double share = rms_error(grid, out, plane, middle) / rms_error(grid, noisy, plane, middle);
+  RecordProperty("percent", std::to_string(100 * share));
+  EXPECT_LT(share, 0.2);  // 1.3 x the measured 15 %, on the sheared grid
 }
 
 // ---- extrema ----
