@@ -25,6 +25,9 @@ const std::map<std::string, std::vector<std::string>> kMayInclude = {
     {"algorithms/formats",
      {"algorithms/progress.h", "algorithms/volume/", "algorithms/surface/mesh.h",
       "algorithms/surface/vector_math.h"}},
+    {"algorithms/formats/dicom",
+     {"algorithms/progress.h", "algorithms/volume/geometry.h", "algorithms/formats/",
+      "algorithms/surface/mesh.h", "algorithms/surface/vector_math.h"}},
     {"service", {"service/"}},
     {"service/storage", {}},
     {"service/jobs", {"service/storage/", "algorithms/method_info.h", "algorithms/progress.h"}},
@@ -33,6 +36,7 @@ const std::map<std::string, std::vector<std::string>> kMayInclude = {
       "algorithms/method_info.h"}},
     {"service/pipeline",
      {"service/jobs/job.h", "service/jobs/problem.h", "service/jobs/job_json.h", "algorithms/"}},
+    {"service/ingest", {"algorithms/formats/", "algorithms/volume/geometry.h", "algorithms/surface/mesh.h"}},
     {"client", {}},
 };
 
@@ -45,8 +49,11 @@ const std::map<std::string, std::vector<std::string>> kLibraryHomes = {
     {"prometheus/", {"service/http"}},
     {"curl/", {"client"}},
     {"png", {"algorithms/formats"}},
-    {"isa-l", {"algorithms/formats"}},
-    {"nlohmann/", {"service", "service/http", "service/jobs", "service/pipeline", "client"}},
+    {"isa-l", {"algorithms/formats", "algorithms/formats/dicom"}},
+    {"gdcm", {"algorithms/formats/dicom"}},
+    {"seccomp", {"service/ingest"}},
+    {"nlohmann/",
+     {"service", "service/http", "service/jobs", "service/pipeline", "service/ingest", "client"}},
 };
 
 struct Include {
