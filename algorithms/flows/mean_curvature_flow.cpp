@@ -4,7 +4,10 @@
 
 #include "algorithms/flows/explicit_steps.h"
 #include "algorithms/flows/face_centred_sweep.h"
+#include "algorithms/flows/intensity_range.h"
 #include "algorithms/flows/mean_curvature_sweep.h"
+#include "algorithms/flows/thesis_sweep.h"
+#include "algorithms/flows/upwind_metric.h"
 
 namespace volsmooth {
 namespace {
@@ -16,35 +19,42 @@ double largest_face_centred_step(const Grid& grid) {
   return kOfLimit * 0.5 / sum_of_larger_eigenvalues(inverse(metric_of(grid)));
 }
 
+/// With H = G^-1, the speed is at most sum_e sqrt(H_ee), which is sum_e 1/h_e at right angles.
 double largest_thesis_step(const Grid& grid) {
-  double sum = 0, sum_of_squares = 0;
-  for (const double h : grid.spacing_mm) {
-    sum += 1 / h;
-    sum_of_squares += 1 / (h * h);
-  }
-  return kRoundingMargin / (sum * std::sqrt(sum_of_squares));
+  const Matrix3 h = inverse(metric_of(grid));
+  const double speed = std::sqrt(h[0][0]) + std::sqrt(h[1][1]) + std::sqrt(h[2][2]);
+  return kRoundingMargin / (speed * largest_upwind_gradient(grid));
+}
+
+ExplicitStep explicit_step(MeanCurvatureScheme scheme, const Grid& grid, double step_mm2) {
+  if (scheme == MeanCurvatureScheme::kFaceCentred)
+    return [=](std::span<const float> from, std::span<float> to, const Progress& report) {
+      face_centred_step(from, to, grid, step_mm2, report);
+    };
+  if (scheme == MeanCurvatureScheme::kThesis && is_orthogonal(grid))
+    return [=](std::span<const float> from, std::span<float> to, const Progress& report) {
+      mean_curvature_step(from, to, grid, step_mm2, report);
+    };
+  ThesisStep step{.step_mm2 = step_mm2, .range = 0};
+  if (scheme == MeanCurvatureScheme::kThesisWeno) step.gains = Reconstruction::kWeno7;
+  return [=](std::span<const float> from, std::span<float> to, const Progress& report) mutable {
+    if (step.range == 0) step.range = intensity_range(from, report);
+    thesis_step(from, to, grid, step, report);
+  };
 }
 
 }  // namespace
 
 StepPlan plan(const MeanCurvatureFlow& flow, const Grid& grid) {
-  return plan_steps(flow.flow_time_mm2, flow.scheme == MeanCurvatureScheme::kThesis
-                                            ? largest_thesis_step(grid)
-                                            : largest_face_centred_step(grid));
+  return plan_steps(flow.flow_time_mm2, flow.scheme == MeanCurvatureScheme::kFaceCentred
+                                            ? largest_face_centred_step(grid)
+                                            : largest_thesis_step(grid));
 }
 
 void smooth(Volume& volume, const MeanCurvatureFlow& flow, const Progress& report) {
   const Grid grid = grid_of(volume);
   const StepPlan steps = plan(flow, grid);
-  take_steps(
-      volume, steps.steps,
-      [&](std::span<const float> from, std::span<float> to, const Progress& report_step) {
-        if (flow.scheme == MeanCurvatureScheme::kThesis)
-          mean_curvature_step(from, to, grid, steps.step_mm2, report_step);
-        else
-          face_centred_step(from, to, grid, steps.step_mm2, report_step);
-      },
-      report);
+  take_steps(volume, steps.steps, explicit_step(flow.scheme, grid, steps.step_mm2), report);
 }
 
 }  // namespace volsmooth

@@ -9,7 +9,8 @@ namespace volsmooth {
 /// How kappa and |grad rho| are discretised (README.md compares them).
 enum class MeanCurvatureScheme {
   kFaceCentred,  ///< the unit normal's flux through a voxel's faces: second order
-  kThesis,       ///< thesis, Eqs. 6.2 to 6.6, with piecewise constant gains: first order. Right angles only
+  kThesis,       ///< thesis, Eqs. 6.2 to 6.6, with piecewise constant gains: first order
+  kThesisWeno,   ///< the same with gains by the WENO scheme of its appendix A
 };
 
 /// d rho / dt = -dA/drho |grad rho|: every isosurface moves along its normal by its mean curvature

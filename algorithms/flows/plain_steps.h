@@ -4,6 +4,7 @@
 
 #include "algorithms/flows/grid_metric.h"
 #include "algorithms/flows/offset_sweep.h"
+#include "algorithms/flows/thesis_sweep.h"
 #include "algorithms/flows/upwind_metric.h"
 #include "algorithms/numerics/curvature.h"
 #include "algorithms/numerics/diffusion.h"
@@ -75,6 +76,25 @@ void plain_mean_curvature_step(std::span<const Scalar> from, std::span<Scalar> t
       normal.after[e] = unit_normal(rho.neighbours(rho.shifted(i, e, 1)), step.inverse_spacing)[e];
     }
     return moved(curvature(normal, step.inverse_spacing), rho(i), rho.neighbours(i), step);
+  });
+}
+
+/// The same on any axes and with any gains.
+template <class Scalar>
+void plain_thesis_step(std::span<const Scalar> from, std::span<Scalar> to, const Grid& grid,
+                       const ThesisStep& step) {
+  const MirroredField<Scalar> rho{from, grid.size};
+  const NormalStep<Scalar> normal_step{scaled_time<Scalar>(grid, step.step_mm2),
+                                       weno_epsilon(static_cast<Scalar>(step.range))};
+  with_upwind_metric<Scalar>(grid, [&](const auto& metric) {
+    with_scheme(step.gains, UpwindGradient::kGodunov, [&](auto gains, auto) {
+      fill_voxels(to, grid.size, [&](const Size3& i) {
+        const auto around = [&](const VoxelOffset& at) {
+          return rho({i[0] + at[0], i[1] + at[1], i[2] + at[2]});
+        };
+        return thesis_moved<gains()>(around, metric, normal_step);
+      });
+    });
   });
 }
 

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "algorithms/numerics/stencil.h"
+#include "algorithms/numerics/metric.h"
 
 namespace volsmooth {
 
@@ -34,6 +34,27 @@ VOLSMOOTH_FORMULA Scalar curvature(const Neighbours<Scalar>& normal,
                                    const std::array<Scalar, 3>& inverse_spacing) {
   Scalar sum = 0;
   for (std::size_t e = 0; e < 3; ++e) sum += (normal.after[e] - normal.before[e]) * inverse_spacing[e];
+  return Scalar{0.5} * sum;
+}
+
+/// The same on any axes: with d = grad_u rho and H = G^-1, s = 1/2 sum_e [(H d)_e / A at i + e - (H d)_e / A
+/// at i - e], A = sqrt(d.H d). |s_i| <= sum_e sqrt(H_ee). `rho(offset)` is the neighbourhood.
+template <class Scalar, class Metric, class Rho>
+VOLSMOOTH_FORMULA Scalar curvature_on(const Rho& rho, const Metric& metric) {
+  const auto flux = [&](auto axis, int side) VOLSMOOTH_INLINE {
+    const VoxelOffset at = moved_along({0, 0, 0}, axis, side);
+    std::array<Scalar, 3> differences;
+    unrolled<3>([&](auto e) VOLSMOOTH_INLINE {
+      differences[e] = rho(moved_along(at, e, 1)) - rho(moved_along(at, e, -1));
+    });
+    const std::array<Scalar, 3> gradient = metric.gradient(differences);
+    const Scalar square = square_of(gradient);
+    const Scalar inverse_length =
+        square >= std::numeric_limits<Scalar>::min() ? Scalar{1} / std::sqrt(square) : Scalar{0};
+    return metric.flux(gradient, axis) * inverse_length;
+  };
+  Scalar sum = 0;
+  unrolled<3>([&](auto e) VOLSMOOTH_INLINE { sum += flux(e, 1) - flux(e, -1); });
   return Scalar{0.5} * sum;
 }
 

@@ -7,14 +7,6 @@
 
 namespace volsmooth {
 
-/// An offset to a voxel among the 3^3 around one.
-using VoxelOffset = std::array<int, 3>;
-
-VOLSMOOTH_FORMULA constexpr VoxelOffset moved_along(VoxelOffset offset, std::size_t axis, int steps) {
-  offset[axis] += steps;
-  return offset;
-}
-
 /// The second invariant of a sum of outer products, divided by its trace: 0 where all vectors are parallel,
 /// a third of the trace where no direction is preferred.
 template <class Scalar>

@@ -24,6 +24,14 @@ VOLSMOOTH_FORMULA void unrolled(const Body& body) {
   }
 }
 
+/// An offset to a voxel near one.
+using VoxelOffset = std::array<int, 3>;
+
+VOLSMOOTH_FORMULA constexpr VoxelOffset moved_along(VoxelOffset offset, std::size_t axis, int steps) {
+  offset[axis] += steps;
+  return offset;
+}
+
 /// The six neighbours of a voxel: [axis].
 template <class Scalar>
 struct Neighbours {

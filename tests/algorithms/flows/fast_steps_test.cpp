@@ -7,6 +7,7 @@
 #include "algorithms/flows/mean_curvature_sweep.h"
 #include "algorithms/flows/offset_sweep.h"
 #include "algorithms/flows/plain_steps.h"
+#include "algorithms/flows/thesis_sweep.h"
 #include "tests/support/phantoms.h"
 
 namespace volsmooth {
@@ -49,6 +50,19 @@ Flow offset_flow(const char* name) {
           }};
 }
 
+template <Reconstruction kGains>
+Flow thesis_flow(const char* name) {
+  return {name,
+          [](std::span<const float> from, std::span<float> to, const Grid& grid, double step_mm2) {
+            plain_thesis_step(from, to, grid, {.gains = kGains, .step_mm2 = step_mm2, .range = 2000});
+          },
+          [](std::span<const float> from, std::span<float> to, const Grid& grid, double step_mm2,
+             InstructionSet set, const TileShape& tile, const Progress& report) {
+            thesis_step(from, to, grid, {.gains = kGains, .step_mm2 = step_mm2, .range = 2000}, set, tile,
+                        report);
+          }};
+}
+
 using enum Reconstruction;
 using enum UpwindGradient;
 
@@ -58,7 +72,9 @@ const Flow kFlows[] = {{"MeanCurvature", plain_mean_curvature_step<float>, mean_
                        offset_flow<kPiecewiseConstant, kGodunov>("OffsetConstant"),
                        offset_flow<kPiecewiseConstant, kEngquistOsher>("OffsetConstantBothSides"),
                        offset_flow<kWeno7, kGodunov>("OffsetWeno7"),
-                       offset_flow<kWeno5, kEngquistOsher>("OffsetWeno5BothSides")};
+                       offset_flow<kWeno5, kEngquistOsher>("OffsetWeno5BothSides"),
+                       thesis_flow<kPiecewiseConstant>("ThesisConstant"),
+                       thesis_flow<kWeno7>("ThesisWeno7")};
 
 struct Case {
   Flow flow;
