@@ -49,6 +49,19 @@ TEST(MassBalance, FindsTheConstantThatKeepsTheMass) {
   }
 }
 
+/// Constants that grow from step to step as they did before are found at once.
+TEST(MassBalance, StartsWhereTheLastTwoConstantsPointTo) {
+  MassBalance<double> balance({.sum = 0, .magnitude = 1}, 1e-12, 2);
+  for (int step = 1; step <= 5; ++step) {
+    int calls = 0;
+    balance.take([&](double constant, const Progress&) {
+      ++calls;
+      return BalancedMass{0.5 + 0.125 * step - constant, 1};
+    });
+    EXPECT_EQ(calls, step <= 2 ? 2 : 1) << "step " << step;
+  }
+}
+
 /// Where all voxels are held the mass does not say which way to go.
 TEST(MassBalance, FindsItsWayBackFromWhereNothingResponds) {
   const auto step = [](double constant, const Progress&) {
