@@ -4,7 +4,8 @@ namespace volsmooth {
 namespace {
 
 template <Reconstruction kScheme, class Scalar>
-VOLSMOOTH_FORMULA void flux_row(FluxRow<Scalar> row) {
+VOLSMOOTH_FORMULA void flux_row(const FluxRow<Scalar>& around) {
+  FluxRow<Scalar> row = around;
 #pragma GCC ivdep
   for (std::int64_t face = 0; face < row.count; ++face) {
     const Scalar velocity = row.velocity[face];
@@ -16,28 +17,8 @@ VOLSMOOTH_FORMULA void flux_row(FluxRow<Scalar> row) {
 }
 
 template <Reconstruction kScheme, class Scalar>
-void flux_baseline(const FluxRow<Scalar>& row) {
-  flux_row<kScheme>(row);
-}
-template <Reconstruction kScheme, class Scalar>
-VOLSMOOTH_AVX2 void flux_avx2(const FluxRow<Scalar>& row) {
-  flux_row<kScheme>(row);
-}
-template <Reconstruction kScheme, class Scalar>
-VOLSMOOTH_AVX512 void flux_avx512(const FluxRow<Scalar>& row) {
-  flux_row<kScheme>(row);
-}
-
-template <Reconstruction kScheme, class Scalar>
 FluxKernel<Scalar> kernel_for(InstructionSet set) {
-  switch (set) {
-    case InstructionSet::kAvx512:
-      return flux_avx512<kScheme, Scalar>;
-    case InstructionSet::kAvx2:
-      return flux_avx2<kScheme, Scalar>;
-    default:
-      return flux_baseline<kScheme, Scalar>;
-  }
+  return row_kernel<FluxRow<Scalar>, flux_row<kScheme, Scalar>>(set);
 }
 
 }  // namespace

@@ -13,25 +13,6 @@ VOLSMOOTH_FORMULA void flow_row(const BalancedRow<Metric>& row) {
   });
 }
 
-using OrthogonalRow = BalancedRow<OrthogonalMetric<float>>;
-using AnyRow = BalancedRow<AnyMetric<float>>;
-
-VOLSMOOTH_FORMULA void orthogonal(const OrthogonalRow& row) {
-  flow_row(row);
-}
-VOLSMOOTH_FORMULA void skew(const AnyRow& row) {
-  flow_row(row);
-}
-VOLSMOOTH_ROW_KERNEL(orthogonal, OrthogonalRow)
-VOLSMOOTH_ROW_KERNEL(skew, AnyRow)
-
-auto kernel_for(const OrthogonalMetric<float>&, InstructionSet set) {
-  return orthogonal_for(set);
-}
-auto kernel_for(const AnyMetric<float>&, InstructionSet set) {
-  return skew_for(set);
-}
-
 }  // namespace
 
 BalancedMass balanced_step(std::span<const float> from, std::span<float> to, const Grid& grid,
@@ -39,9 +20,11 @@ BalancedMass balanced_step(std::span<const float> from, std::span<float> to, con
                            const Progress& report) {
   BalancedMass sums;
   with_metric<float>(grid, [&](const auto& metric) {
-    const BalancedRow<std::decay_t<decltype(metric)>> row{
+    using Metric = std::decay_t<decltype(metric)>;
+    const BalancedRow<Metric> row{
         .metric = metric, .constant = constant, .time = scaled_time<float>(grid, step_mm2)};
-    sums = balance_rows(from, to, grid.size, row, kernel_for(metric, set), shape, report);
+    sums = balance_rows(from, to, grid.size, row, row_kernel<BalancedRow<Metric>, flow_row<Metric>>(set),
+                        shape, report);
   });
   return sums;
 }

@@ -9,7 +9,8 @@ using OrthogonalRow = FaceCentredRow<OrthogonalMetric<float>>;
 using AnyRow = FaceCentredRow<AnyMetric<float>>;
 
 template <class Metric>
-VOLSMOOTH_FORMULA void move_row(FaceCentredRow<Metric> row) {
+VOLSMOOTH_FORMULA void move_row(const FaceCentredRow<Metric>& around) {
+  FaceCentredRow<Metric> row = around;
 #pragma GCC ivdep
   for (std::int64_t x = 0; x < row.count; ++x) {
     const auto rho = [&](const VoxelOffset& at) VOLSMOOTH_INLINE {
@@ -19,24 +20,15 @@ VOLSMOOTH_FORMULA void move_row(FaceCentredRow<Metric> row) {
   }
 }
 
-VOLSMOOTH_FORMULA void orthogonal(const OrthogonalRow& row) {
-  move_row(row);
-}
-VOLSMOOTH_FORMULA void skew(const AnyRow& row) {
-  move_row(row);
-}
-VOLSMOOTH_ROW_KERNEL(orthogonal, OrthogonalRow)
-VOLSMOOTH_ROW_KERNEL(skew, AnyRow)
-
 }  // namespace
 
 template <>
 FaceCentredKernel<OrthogonalMetric<float>> face_centred_kernel(InstructionSet set) {
-  return orthogonal_for(set);
+  return row_kernel<OrthogonalRow, move_row<OrthogonalMetric<float>>>(set);
 }
 template <>
 FaceCentredKernel<AnyMetric<float>> face_centred_kernel(InstructionSet set) {
-  return skew_for(set);
+  return row_kernel<AnyRow, move_row<AnyMetric<float>>>(set);
 }
 
 }  // namespace volsmooth

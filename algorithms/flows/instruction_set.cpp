@@ -6,8 +6,8 @@ namespace {
 std::vector<InstructionSet> detect() {
   std::vector<InstructionSet> sets{InstructionSet::kBaseline};
 #if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx2")) sets.push_back(InstructionSet::kAvx2);
-  if (__builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq"))
+  if (kAllInstructionSets && __builtin_cpu_supports("avx2")) sets.push_back(InstructionSet::kAvx2);
+  if (kAllInstructionSets && __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq"))
     sets.push_back(InstructionSet::kAvx512);
 #endif
   return sets;

@@ -26,35 +26,13 @@ VOLSMOOTH_FORMULA float diffused_at(const DiffusedRow& row, std::int64_t x, std:
                   row.factors);
 }
 
-VOLSMOOTH_FORMULA void diffuse_row(DiffusedRow row) {
+VOLSMOOTH_FORMULA void diffuse_row(const DiffusedRow& around) {
+  DiffusedRow row = around;
   const std::int64_t last = row.count - 1;
   row.diffused[0] = diffused_at(row, 0, 0, std::min<std::int64_t>(1, last));
 #pragma GCC ivdep
   for (std::int64_t x = 1; x < last; ++x) row.diffused[x] = diffused_at(row, x, x - 1, x + 1);
   if (last > 0) row.diffused[last] = diffused_at(row, last, last - 1, last);
-}
-
-void diffuse_baseline(const DiffusedRow& row) {
-  diffuse_row(row);
-}
-VOLSMOOTH_AVX2 void diffuse_avx2(const DiffusedRow& row) {
-  diffuse_row(row);
-}
-VOLSMOOTH_AVX512 void diffuse_avx512(const DiffusedRow& row) {
-  diffuse_row(row);
-}
-
-using DiffuseRow = void (*)(const DiffusedRow&);
-
-DiffuseRow diffuse_row_for(InstructionSet set) {
-  switch (set) {
-    case InstructionSet::kAvx512:
-      return diffuse_avx512;
-    case InstructionSet::kAvx2:
-      return diffuse_avx2;
-    default:
-      return diffuse_baseline;
-  }
 }
 
 /// Three planes of a tile fit the second-level cache; up to 280^2, that is three whole planes.
@@ -67,7 +45,7 @@ void right_angled_step(std::span<const float> from, std::span<float> to, const G
                        InstructionSet set, const TileShape& shape, const Progress& report) {
   const Size3 size = grid.size;
   const auto factors = flux_per_difference<float>(grid.spacing_mm, step_mm2);
-  const DiffuseRow diffuse = diffuse_row_for(set);
+  const auto diffuse = row_kernel<DiffusedRow, diffuse_row>(set);
   const auto row = [&](std::int64_t y, std::int64_t z) {
     return from.data() + (reflected(z, size[2]) * size[1] + reflected(y, size[1])) * size[0];
   };
@@ -92,19 +70,19 @@ struct GainRow {
   float* gain;  ///< added to
 };
 
-VOLSMOOTH_FORMULA void gain_row(GainRow row) {
+VOLSMOOTH_FORMULA void gain_row(const GainRow& around) {
+  GainRow row = around;
 #pragma GCC ivdep
   for (std::int64_t x = 0; x < row.count; ++x)
     row.gain[x] += link_gain(row.here[x], row.there[x], row.factor);
 }
-VOLSMOOTH_ROW_KERNEL(gain_row, GainRow)
 
 /// Rows exchange with the rows that links lead to; what would lead out of the volume leads nowhere.
 void skew_step(std::span<const float> from, std::span<float> to, const Grid& grid, double step_mm2,
                InstructionSet set, const TileShape& shape, const Progress& report) {
   const Size3 size = grid.size;
   const auto links = heat_links<float>(inverse(metric_of(grid)), step_mm2);
-  const auto gain_from = gain_row_for(set);
+  const auto gain_from = row_kernel<GainRow, gain_row>(set);
   const auto add_gains = [&](std::int64_t y, std::int64_t z, std::vector<float>& gain) {
     const float* here = from.data() + (z * size[1] + y) * size[0];
     for (const auto& [offset, factor] : links) {

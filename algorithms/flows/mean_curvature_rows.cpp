@@ -15,7 +15,8 @@ VOLSMOOTH_FORMULA Neighbours<float> at(const RowNeighbours& rows, std::int64_t x
   return values;
 }
 
-VOLSMOOTH_FORMULA void normal_row(NormalRow row) {
+VOLSMOOTH_FORMULA void normal_row(const NormalRow& around) {
+  NormalRow row = around;
 #pragma GCC ivdep
   for (std::int64_t x = 0; x < row.count; ++x) {
     const std::array<float, 3> normal = unit_normal(at(row.rho, x), row.inverse_spacing);
@@ -23,7 +24,8 @@ VOLSMOOTH_FORMULA void normal_row(NormalRow row) {
   }
 }
 
-VOLSMOOTH_FORMULA void moved_row(MovedRow row) {
+VOLSMOOTH_FORMULA void moved_row(const MovedRow& around) {
+  MovedRow row = around;
 #pragma GCC ivdep
   for (std::int64_t x = 0; x < row.count; ++x) {
     const float speed = curvature(at(row.normal, x), row.step.inverse_spacing);
@@ -31,36 +33,10 @@ VOLSMOOTH_FORMULA void moved_row(MovedRow row) {
   }
 }
 
-void normal_baseline(const NormalRow& row) {
-  normal_row(row);
-}
-void moved_baseline(const MovedRow& row) {
-  moved_row(row);
-}
-VOLSMOOTH_AVX2 void normal_avx2(const NormalRow& row) {
-  normal_row(row);
-}
-VOLSMOOTH_AVX2 void moved_avx2(const MovedRow& row) {
-  moved_row(row);
-}
-VOLSMOOTH_AVX512 void normal_avx512(const NormalRow& row) {
-  normal_row(row);
-}
-VOLSMOOTH_AVX512 void moved_avx512(const MovedRow& row) {
-  moved_row(row);
-}
-
 }  // namespace
 
 MeanCurvatureRows mean_curvature_rows(InstructionSet set) {
-  switch (set) {
-    case InstructionSet::kAvx512:
-      return {normal_avx512, moved_avx512};
-    case InstructionSet::kAvx2:
-      return {normal_avx2, moved_avx2};
-    default:
-      return {normal_baseline, moved_baseline};
-  }
+  return {row_kernel<NormalRow, normal_row>(set), row_kernel<MovedRow, moved_row>(set)};
 }
 
 }  // namespace volsmooth

@@ -22,7 +22,8 @@ struct MovedRow {
 };
 
 template <Reconstruction kGains, UpwindGradient kUpwind, class Metric>
-VOLSMOOTH_FORMULA void move_row(MovedRow<Metric> row) {
+VOLSMOOTH_FORMULA void move_row(const MovedRow<Metric>& around) {
+  MovedRow<Metric> row = around;
 #pragma GCC ivdep
   for (std::int64_t x = 0; x < row.count; ++x) {
     const auto rho = [&](std::size_t axis, int k) VOLSMOOTH_INLINE {
@@ -32,31 +33,11 @@ VOLSMOOTH_FORMULA void move_row(MovedRow<Metric> row) {
   }
 }
 
-template <Reconstruction kGains, UpwindGradient kUpwind, class Metric>
-void move_baseline(const MovedRow<Metric>& row) {
-  move_row<kGains, kUpwind>(row);
-}
-template <Reconstruction kGains, UpwindGradient kUpwind, class Metric>
-VOLSMOOTH_AVX2 void move_avx2(const MovedRow<Metric>& row) {
-  move_row<kGains, kUpwind>(row);
-}
-template <Reconstruction kGains, UpwindGradient kUpwind, class Metric>
-VOLSMOOTH_AVX512 void move_avx512(const MovedRow<Metric>& row) {
-  move_row<kGains, kUpwind>(row);
-}
-
 template <class Metric>
-using Kernel = void (*)(const MovedRow<Metric>&);
-
-template <class Metric>
-Kernel<Metric> kernel_for(const OffsetStage& stage, InstructionSet set) {
-  Kernel<Metric> kernel = nullptr;
+RowKernel<MovedRow<Metric>> kernel_for(const OffsetStage& stage, InstructionSet set) {
+  RowKernel<MovedRow<Metric>> kernel = nullptr;
   with_scheme(stage.gains, stage.upwind, [&](auto gains, auto upwind) {
-    if (set == InstructionSet::kAvx512)
-      kernel = move_avx512<gains(), upwind(), Metric>;
-    else
-      kernel = set == InstructionSet::kAvx2 ? move_avx2<gains(), upwind(), Metric>
-                                            : move_baseline<gains(), upwind(), Metric>;
+    kernel = row_kernel<MovedRow<Metric>, move_row<gains(), upwind(), Metric>>(set);
   });
   return kernel;
 }

@@ -14,25 +14,6 @@ VOLSMOOTH_FORMULA void sharpen_row(const BalancedRow<Metric>& row) {
   });
 }
 
-using OrthogonalRow = BalancedRow<OrthogonalMetric<float>>;
-using AnyRow = BalancedRow<AnyUpwindMetric<float>>;
-
-VOLSMOOTH_FORMULA void orthogonal(const OrthogonalRow& row) {
-  sharpen_row(row);
-}
-VOLSMOOTH_FORMULA void skew(const AnyRow& row) {
-  sharpen_row(row);
-}
-VOLSMOOTH_ROW_KERNEL(orthogonal, OrthogonalRow)
-VOLSMOOTH_ROW_KERNEL(skew, AnyRow)
-
-auto kernel_for(const OrthogonalMetric<float>&, InstructionSet set) {
-  return orthogonal_for(set);
-}
-auto kernel_for(const AnyUpwindMetric<float>&, InstructionSet set) {
-  return skew_for(set);
-}
-
 }  // namespace
 
 BalancedMass sharpening_step(std::span<const float> from, std::span<float> to, const Grid& grid,
@@ -40,9 +21,11 @@ BalancedMass sharpening_step(std::span<const float> from, std::span<float> to, c
                              const Progress& report) {
   BalancedMass sums;
   with_upwind_metric<float>(grid, [&](const auto& metric) {
-    const BalancedRow<std::decay_t<decltype(metric)>> row{
+    using Metric = std::decay_t<decltype(metric)>;
+    const BalancedRow<Metric> row{
         .metric = metric, .constant = constant, .time = static_cast<float>(step_mm / unit_of(grid))};
-    sums = balance_rows(from, to, grid.size, row, kernel_for(metric, set), shape, report);
+    sums = balance_rows(from, to, grid.size, row, row_kernel<BalancedRow<Metric>, sharpen_row<Metric>>(set),
+                        shape, report);
   });
   return sums;
 }

@@ -21,7 +21,8 @@ struct MovedRow {
 };
 
 template <class Row>
-VOLSMOOTH_FORMULA void move_row(Row row) {
+VOLSMOOTH_FORMULA void move_row(const Row& around) {
+  Row row = around;
 #pragma GCC ivdep
   for (std::int64_t x = 0; x < row.count; ++x) {
     const auto rho = [&](const VoxelOffset& at) VOLSMOOTH_INLINE {
@@ -32,31 +33,12 @@ VOLSMOOTH_FORMULA void move_row(Row row) {
   }
 }
 
-template <class Row>
-void move_baseline(const Row& row) {
-  move_row(row);
-}
-template <class Row>
-VOLSMOOTH_AVX2 void move_avx2(const Row& row) {
-  move_row(row);
-}
-template <class Row>
-VOLSMOOTH_AVX512 void move_avx512(const Row& row) {
-  move_row(row);
-}
-
-template <class Row>
-auto kernel_for(InstructionSet set) {
-  if (set == InstructionSet::kAvx512) return move_avx512<Row>;
-  return set == InstructionSet::kAvx2 ? move_avx2<Row> : move_baseline<Row>;
-}
-
 template <Reconstruction kGains>
 void step_with(std::span<const float> from, std::span<float> to, const Grid& grid, const ThesisStep& step,
                InstructionSet set, const TileShape& shape, const Progress& report) {
   with_upwind_metric<float>(grid, [&](const auto& metric) {
     using Row = MovedRow<kGains, std::decay_t<decltype(metric)>>;
-    const auto kernel = kernel_for<Row>(set);
+    const auto kernel = row_kernel<Row, move_row<Row>>(set);
     const NormalStep<float> normal_step{scaled_time<float>(grid, step.step_mm2), weno_epsilon(step.range)};
     const auto move = [&](const StencilRow& row) {
       Row moved{row.padded_count, {}, metric, normal_step, row.output(0)};
