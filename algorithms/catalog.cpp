@@ -133,7 +133,8 @@ Meaning chosen(const Choices<Meaning>& choices, const std::string& name) {
 
 const Choices<MeanCurvatureScheme>& mean_curvature_schemes() {
   static const Choices<MeanCurvatureScheme> schemes{{"face-centred", MeanCurvatureScheme::kFaceCentred},
-                                                    {"thesis", MeanCurvatureScheme::kThesis}};
+                                                    {"thesis", MeanCurvatureScheme::kThesis},
+                                                    {"thesis-weno", MeanCurvatureScheme::kThesisWeno}};
   return schemes;
 }
 
@@ -269,7 +270,8 @@ std::vector<Method> make_catalog() {
                   "features and noise vanish, edges stay sharp.",
                   {choice_parameter("scheme",
                                     "How curvature and gradient are discretised: 'face-centred' is of second "
-                                    "order, 'thesis' that of the method's source.",
+                                    "order; 'thesis' is that of the method's source, of first order, and "
+                                    "'thesis-weno' the same with gains of high order.",
                                     mean_curvature_schemes()),
                    surface_parameter(), half_width_parameter()},
                   mean_curvature_flow),

@@ -58,17 +58,6 @@ tl::expected<void, Problem> check_distance(const ParameterValues& resolved, cons
               {{"member", "distance_mm"}, {"minimum", -sides}, {"maximum", sides}, {"unit", "mm"}}});
 }
 
-tl::expected<void, Problem> check_scheme(const ParameterValues& asked, const MethodInput& input) {
-  const auto scheme = asked.find("scheme");
-  if (scheme == asked.end() || is_orthogonal(input.grid) ||
-      std::get<std::string>(scheme->second) == "face-centred")
-    return {};
-  return tl::unexpected(
-      Problem{"bad-parameter",
-              "'scheme' must be face-centred for this volume: its axes do not meet at right angles.",
-              {{"member", "scheme"}, {"choices", {"face-centred"}}}});
-}
-
 }  // namespace
 
 tl::expected<JobPlan, Problem> plan_job(const JobOrder& order, const VolumeFacts& volume,
@@ -76,8 +65,6 @@ tl::expected<JobPlan, Problem> plan_job(const JobOrder& order, const VolumeFacts
   if (const auto checked = check_isovalues(order, volume); !checked) return tl::unexpected(checked.error());
 
   const MethodInput input = input_of(volume);
-  if (const auto checked = check_scheme(order.parameters, input); !checked)
-    return tl::unexpected(checked.error());
   const auto voxels = static_cast<double>(voxel_count(input.grid.size));
   JobPlan plan;
   plan.parameters = method_called(order.method).resolve(order.parameters, input);

@@ -121,19 +121,6 @@ TEST(Plan, AnOffsetLongerThanTheVolumeIsRefused) {
   EXPECT_EQ(plan.error().members.at("member"), "distance_mm");
 }
 
-/// The sheared 20 degrees of which the thesis' own scheme knows nothing.
-TEST(Plan, TheThesisSchemeIsRefusedOnSkewAxes) {
-  VolumeFacts sheared = head();
-  sheared.affine = {{{1, 0, 0.36, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}};
-  JobOrder asked = order("mean-curvature-flow", 1);
-  EXPECT_TRUE(plan_job(asked, sheared, {}));
-  asked.parameters["scheme"] = "thesis";
-  EXPECT_TRUE(plan_job(asked, head(), {}));
-  const auto plan = plan_job(asked, sheared, {});
-  ASSERT_FALSE(plan);
-  EXPECT_EQ(plan.error().members.at("member"), "scheme");
-}
-
 TEST(Plan, CompareCostsItsPartsTogether) {
   PipelineLimits limits;
   const auto flow = plan_job(order("mean-curvature-flow", 25), head(), limits);
