@@ -75,6 +75,7 @@ class ByteWriter {
 
   void append_zeros(std::size_t count) { bytes_.resize(bytes_.size() + count); }
   void append_bytes(const ByteVector& more) { bytes_.insert(bytes_.end(), more.begin(), more.end()); }
+  std::size_t size() const { return bytes_.size(); }
   ByteVector take() { return std::move(bytes_); }
 
  private:
