@@ -30,8 +30,6 @@ std::string text(const ParameterValues& values, const std::string& name, const s
 
 using Parameters = std::vector<ParameterInfo>;
 
-constexpr double kSharpeningBytesPerVoxel = 3 * sizeof(float);  // the next volume and the two gradients
-
 Parameters joined(Parameters some, Parameters more) {
   std::ranges::move(more, std::back_inserter(some));
   return some;
@@ -260,7 +258,7 @@ Method sharpening_method() {
           },
       .run = [](Volume& volume, const ParameterValues& resolved,
                 const Progress& report) { smooth_as_asked(volume, sharpening(resolved), resolved, report); },
-      .extra_bytes_per_voxel = kSharpeningBytesPerVoxel};
+      .extra_bytes_per_voxel = sizeof(float)};
 }
 
 std::vector<Method> make_catalog() {

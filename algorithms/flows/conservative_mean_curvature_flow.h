@@ -22,8 +22,9 @@ StepPlan plan(const ConservativeMeanCurvatureFlow& flow, const Grid& grid);
 double largest_speed(const Grid& grid);
 
 /// Lets all isosurfaces of `volume` flow, on all cores of the current arena. The sum of all values stays what
-/// it was, to 1e-8 of the sum of their magnitudes, over any number of steps; no value leaves the input's
-/// range; the result does not depend on the number of threads. The volume's buffer may be another one
+/// it was over any number of steps: to 1e-8 of the sum of their magnitudes, but where no constant in float
+/// does that, as in volumes of few voxels or of few values, to `kFloatMassTolerance`. No value leaves the
+/// input's range; the result does not depend on the number of threads. The volume's buffer may be another one
 /// afterwards. When `report` throws, the intensities are left undefined.
 void smooth(Volume& volume, const ConservativeMeanCurvatureFlow& flow, const Progress& report = no_progress);
 

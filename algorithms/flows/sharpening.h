@@ -26,9 +26,9 @@ struct SharpeningPlan {
 SharpeningPlan plan(const Sharpening& sharpening, const Grid& grid);
 
 /// Sharpens a density, values in [0, 1] (see volume/density.h), on all cores of the current arena. The sum of
-/// all values stays what it was, to 1e-8 of it; no value leaves the input's range; the result does not depend
-/// on the number of threads. The volume's buffer may be another one afterwards. When `report` throws, the
-/// values are left undefined.
+/// all values stays what it was, as in `ConservativeMeanCurvatureFlow`; no value leaves the input's range;
+/// the result does not depend on the number of threads. The volume's buffer may be another one afterwards.
+/// When `report` throws, the values are left undefined.
 void smooth(Volume& density, const Sharpening& sharpening, const Progress& report = no_progress);
 
 }  // namespace volsmooth

@@ -62,6 +62,21 @@ TEST(MassBalance, StartsWhereTheLastTwoConstantsPointTo) {
   }
 }
 
+/// Of two constants next to each other, one lets too much stay and the other too little.
+TEST(MassBalance, TakesTheNearerOfTwoConstantsBetweenWhichTheMassJumps) {
+  for (const double surplus : {0.1, 0.9}) {
+    for (const float jump : {-0.7F, -0.1F, 0.3F, 1.1F}) {
+      MassBalance<float> balance({.sum = 0, .magnitude = 1}, 1e-8, 2);
+      double last = 0;
+      balance.take([&](float constant, const Progress&) {
+        last = constant < jump ? surplus : surplus - 1;
+        return BalancedMass{last, 1};
+      });
+      EXPECT_NEAR(std::abs(last), 0.1, 1e-12) << "jump at " << jump;
+    }
+  }
+}
+
 /// Where all voxels are held the mass does not say which way to go.
 TEST(MassBalance, FindsItsWayBackFromWhereNothingResponds) {
   const auto step = [](double constant, const Progress&) {
