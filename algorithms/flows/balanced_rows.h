@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "algorithms/flows/instruction_set.h"
 #include "algorithms/flows/mass_balance.h"
 #include "algorithms/flows/stencil_sweep.h"
 #include "algorithms/numerics/balanced.h"
@@ -18,6 +19,9 @@ struct BalancedRow {
   std::array<const float*, 9> rows{};  ///< [3 (dz + 1) + dy + 1]
   float *moved = nullptr, *response = nullptr;
 };
+
+template <class Metric>
+using BalancedKernel = RowKernel<BalancedRow<Metric>>;
 
 /// `move(rho)` is the formula, of a voxel's 3^3 neighbourhood.
 template <class Metric, class Move>
@@ -36,7 +40,7 @@ VOLSMOOTH_FORMULA void balance_row(BalancedRow<Metric> row, const Move& move) {
 /// Runs `kernel` on every row of a volume; `row` holds what is the same for all.
 template <class Metric>
 BalancedMass balance_rows(std::span<const float> from, std::span<float> to, const Size3& size,
-                          const BalancedRow<Metric>& row, void (*kernel)(const BalancedRow<Metric>&),
+                          const BalancedRow<Metric>& row, BalancedKernel<Metric> kernel,
                           const TileShape& shape, const Progress& report) {
   RowSums sums(size[1] * size[2]);
   const auto balance = [&](const StencilRow& around) {

@@ -32,8 +32,8 @@ std::int64_t mirrored(std::int64_t index, std::int64_t size) {
 /// One thread's rows, filled again and again.
 class Packing {
  public:
-  Packing(const NarrowBand& band, std::int64_t radius, std::span<float> values)
-      : band_(band), radius_(radius), side_(2 * radius + 1), values_(values) {}
+  Packing(const NarrowBand& band, std::int64_t radius, const std::vector<std::span<float>>& outputs)
+      : band_(band), radius_(radius), side_(2 * radius + 1), outputs_(outputs) {}
 
   void run(std::span<const CellRun> runs, const std::function<void(const PackedRow&)>& body) {
     while (!runs.empty()) {
@@ -91,7 +91,7 @@ class Packing {
     if (needed <= stride_) return;
     stride_ = needed;
     floats_.assign(static_cast<std::size_t>(side_ * side_ * stride_), 0.0F);
-    out_.resize(static_cast<std::size_t>(stride_));
+    out_.resize(outputs_.size() * static_cast<std::size_t>(stride_));
     rows_.clear();
     for (std::int64_t row = 0; row < side_ * side_; ++row)
       rows_.push_back(floats_.data() + row * stride_ + radius_);
@@ -112,26 +112,31 @@ class Packing {
   }
 
   void unpack(std::span<const CellRun> runs) const {
-    const float* from = out_.data();
-    for (const CellRun& run : runs) {
-      std::copy_n(from, run.count(), values_.data() + run.first);
-      from += run.count() + 2 * radius_;
+    const float* from_first = out_.data();
+    for (const std::span<float> output : outputs_) {
+      const float* from = from_first;
+      for (const CellRun& run : runs) {
+        std::copy_n(from, run.count(), output.data() + run.first);
+        from += run.count() + 2 * radius_;
+      }
+      from_first += PlaneRing::padded(length_);
     }
   }
 
   const NarrowBand& band_;
   std::int64_t radius_, side_, stride_ = 0, length_ = 0;
-  std::span<float> values_;
+  const std::vector<std::span<float>>& outputs_;
   std::vector<float> floats_, out_;
   std::vector<const float*> rows_;
 };
 
 }  // namespace
 
-void for_each_packed_row(const NarrowBand& band, std::int64_t radius, std::span<float> values,
+void for_each_packed_row(const NarrowBand& band, std::int64_t radius,
+                         const std::vector<std::span<float>>& outputs,
                          const std::function<void(const PackedRow&)>& body, const Progress& report) {
   constexpr std::int64_t kRunsOfChunk = 256;
-  oneapi::tbb::enumerable_thread_specific<Packing> packings(band, radius, values);
+  oneapi::tbb::enumerable_thread_specific<Packing> packings(band, radius, outputs);
   parallel_for(
       std::ssize(band.runs()), kRunsOfChunk,
       [&](std::int64_t begin, std::int64_t end) {

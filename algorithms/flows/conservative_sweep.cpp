@@ -1,6 +1,5 @@
 #include "algorithms/flows/conservative_sweep.h"
 
-#include "algorithms/flows/balanced_rows.h"
 #include "algorithms/flows/grid_metric.h"
 
 namespace volsmooth {
@@ -15,6 +14,13 @@ VOLSMOOTH_FORMULA void flow_row(const BalancedRow<Metric>& row) {
 
 }  // namespace
 
+template <class Metric>
+BalancedKernel<Metric> conservative_kernel(InstructionSet set) {
+  return row_kernel<BalancedRow<Metric>, flow_row<Metric>>(set);
+}
+template BalancedKernel<OrthogonalMetric<float>> conservative_kernel(InstructionSet set);
+template BalancedKernel<AnyMetric<float>> conservative_kernel(InstructionSet set);
+
 BalancedMass balanced_step(std::span<const float> from, std::span<float> to, const Grid& grid,
                            double step_mm2, float constant, InstructionSet set, const TileShape& shape,
                            const Progress& report) {
@@ -23,8 +29,7 @@ BalancedMass balanced_step(std::span<const float> from, std::span<float> to, con
     using Metric = std::decay_t<decltype(metric)>;
     const BalancedRow<Metric> row{
         .metric = metric, .constant = constant, .time = scaled_time<float>(grid, step_mm2)};
-    sums = balance_rows(from, to, grid.size, row, row_kernel<BalancedRow<Metric>, flow_row<Metric>>(set),
-                        shape, report);
+    sums = balance_rows(from, to, grid.size, row, conservative_kernel<Metric>(set), shape, report);
   });
   return sums;
 }

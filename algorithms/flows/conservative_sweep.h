@@ -2,6 +2,7 @@
 
 #include <span>
 
+#include "algorithms/flows/balanced_rows.h"
 #include "algorithms/flows/instruction_set.h"
 #include "algorithms/flows/mass_balance.h"
 #include "algorithms/flows/tiles.h"
@@ -19,5 +20,9 @@ BalancedMass balanced_step(std::span<const float> from, std::span<float> to, con
 BalancedMass balanced_step(std::span<const float> from, std::span<float> to, const Grid& grid,
                            double step_mm2, float constant, InstructionSet set, const TileShape& shape,
                            const Progress& report);
+
+/// The row kernel of both, for metrics at right angles and for `AnyMetric`, in float.
+template <class Metric>
+BalancedKernel<Metric> conservative_kernel(InstructionSet set);
 
 }  // namespace volsmooth

@@ -1,6 +1,5 @@
 #include "algorithms/flows/sharpening_sweep.h"
 
-#include "algorithms/flows/balanced_rows.h"
 #include "algorithms/flows/upwind_metric.h"
 #include "algorithms/numerics/sharpening.h"
 
@@ -16,6 +15,13 @@ VOLSMOOTH_FORMULA void sharpen_row(const BalancedRow<Metric>& row) {
 
 }  // namespace
 
+template <class Metric>
+BalancedKernel<Metric> sharpening_kernel(InstructionSet set) {
+  return row_kernel<BalancedRow<Metric>, sharpen_row<Metric>>(set);
+}
+template BalancedKernel<OrthogonalMetric<float>> sharpening_kernel(InstructionSet set);
+template BalancedKernel<AnyUpwindMetric<float>> sharpening_kernel(InstructionSet set);
+
 BalancedMass sharpening_step(std::span<const float> from, std::span<float> to, const Grid& grid,
                              double step_mm, float constant, InstructionSet set, const TileShape& shape,
                              const Progress& report) {
@@ -24,8 +30,7 @@ BalancedMass sharpening_step(std::span<const float> from, std::span<float> to, c
     using Metric = std::decay_t<decltype(metric)>;
     const BalancedRow<Metric> row{
         .metric = metric, .constant = constant, .time = static_cast<float>(step_mm / unit_of(grid))};
-    sums = balance_rows(from, to, grid.size, row, row_kernel<BalancedRow<Metric>, sharpen_row<Metric>>(set),
-                        shape, report);
+    sums = balance_rows(from, to, grid.size, row, sharpening_kernel<Metric>(set), shape, report);
   });
   return sums;
 }

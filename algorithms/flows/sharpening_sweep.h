@@ -2,6 +2,7 @@
 
 #include <span>
 
+#include "algorithms/flows/balanced_rows.h"
 #include "algorithms/flows/instruction_set.h"
 #include "algorithms/flows/mass_balance.h"
 #include "algorithms/flows/tiles.h"
@@ -19,5 +20,9 @@ BalancedMass sharpening_step(std::span<const float> from, std::span<float> to, c
 BalancedMass sharpening_step(std::span<const float> from, std::span<float> to, const Grid& grid,
                              double step_mm, float constant, InstructionSet set, const TileShape& shape,
                              const Progress& report);
+
+/// The row kernel of both, for metrics at right angles and for `AnyUpwindMetric`, in float.
+template <class Metric>
+BalancedKernel<Metric> sharpening_kernel(InstructionSet set);
 
 }  // namespace volsmooth

@@ -96,6 +96,29 @@ void NarrowBand::assign(std::span<const float> values, const Progress& report) {
   if (!changed.empty()) follow(around(changed), report);
 }
 
+std::vector<float> NarrowBand::densities() const {
+  std::vector<float> values(static_cast<std::size_t>(cell_count()));
+  for_each_chunk(
+      runs_,
+      [&](std::size_t, std::span<const CellRun> runs) {
+        for (const CellRun& run : runs)
+          std::copy_n(row(run.y, run.z) + run.x_begin, run.count(), values.data() + run.first);
+      },
+      no_progress);
+  return values;
+}
+
+void NarrowBand::exchange(std::span<float> values) {
+  for_each_chunk(
+      runs_,
+      [&](std::size_t, std::span<const CellRun> runs) {
+        for (const CellRun& run : runs)
+          std::swap_ranges(values.data() + run.first, values.data() + run.first + run.count(),
+                           cells_of_row(run.y, run.z) + run.x_begin);
+      },
+      no_progress);
+}
+
 /// Puts `values` in place. Returns, of each run, all between the first and the last cell whose state is new.
 std::vector<CellRun> NarrowBand::changes_of(std::span<const float> values, const Progress& report) {
   const float epsilon = limits_.epsilon;

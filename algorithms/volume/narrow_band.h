@@ -46,6 +46,12 @@ class NarrowBand {
   /// and leave where a cell settled or ceased to be. Costs time in proportion to the band alone.
   void assign(std::span<const float> values, const Progress& report = no_progress);
 
+  /// The densities of the cells, in the order of the runs.
+  std::vector<float> densities() const;
+
+  /// Densities and `values` change places, and the band stays where it is: for the stages of a step.
+  void exchange(std::span<float> values);
+
   /// Sum of the densities that cells lost when they settled at 0 or 1 (they gain where this is negative).
   double settled() const { return settled_; }
 

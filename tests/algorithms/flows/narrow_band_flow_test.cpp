@@ -9,6 +9,7 @@
 #include "algorithms/flows/mean_curvature_flow.h"
 #include "algorithms/volume/parallel.h"
 #include "tests/support/phantoms.h"
+#include "tests/support/surface_distance.h"
 
 namespace volsmooth {
 namespace {
@@ -57,34 +58,6 @@ Density dumbbell(double bar_radius) {
 }
 
 const Grid kBox{{48, 25, 25}, {1, 1, 1}};
-
-/// How far apart two .5 surfaces are along the edges of the grid that they cross, in voxels. An edge that
-/// only one of them crosses counts from the end that is in doubt.
-double largest_distance(const Size3& size, const std::vector<float>& a, const std::vector<float>& b) {
-  double largest = 0;
-  const std::array<std::size_t, 3> steps{1, static_cast<std::size_t>(size[0]),
-                                         static_cast<std::size_t>(size[0] * size[1])};
-  std::size_t cell = 0;
-  for_each_voxel({size, {1, 1, 1}}, [&](const Size3& index, const Vector3&) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const std::size_t next = cell + steps[axis];
-      if (index[axis] + 1 >= size[axis]) continue;
-      const auto crosses = [&](const std::vector<float>& rho) {
-        return (rho[cell] < 0.5F) != (rho[next] < 0.5F);
-      };
-      const auto crossing = [&](const std::vector<float>& rho) {
-        return std::clamp((0.5 - double{rho[cell]}) / (double{rho[next]} - double{rho[cell]}), 0.0, 1.0);
-      };
-      const auto off_end = [](double at) { return std::min(at, 1 - at); };
-      if (crosses(a) && crosses(b))
-        largest = std::max(largest, std::abs(crossing(a) - crossing(b)));
-      else if (crosses(a) || crosses(b))
-        largest = std::max(largest, off_end(crossing(crosses(a) ? a : b)));
-    }
-    ++cell;
-  });
-  return largest;
-}
 
 double mass_of(const std::vector<float>& density) {
   return std::accumulate(density.begin(), density.end(), 0.0);
@@ -242,7 +215,7 @@ TEST(NarrowBandFlow, ReportsRisingProgressAndCanBeCancelled) {
   auto volume = volume_of(kBox, sampled(kBox, dumbbell(4)));
   double last = 0;
   with_threads(1, [&] {
-    smooth_surface(*volume, {.flow_time_mm2 = 1}, [&](double fraction) {
+    smooth_surface(*volume, SurfaceFlow{.flow_time_mm2 = 1}, [&](double fraction) {
       EXPECT_GE(fraction, last);
       EXPECT_LE(fraction, 1);
       last = fraction;
@@ -252,7 +225,7 @@ TEST(NarrowBandFlow, ReportsRisingProgressAndCanBeCancelled) {
   const Progress cancel_half_way = [](double fraction) {
     if (fraction > 0.5) throw Cancelled();
   };
-  EXPECT_THROW(smooth_surface(*volume, {.flow_time_mm2 = 1}, cancel_half_way), Cancelled);
+  EXPECT_THROW(smooth_surface(*volume, SurfaceFlow{.flow_time_mm2 = 1}, cancel_half_way), Cancelled);
 }
 
 }  // namespace
