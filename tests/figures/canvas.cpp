@@ -8,18 +8,6 @@ namespace {
 
 constexpr Colour kWhite{255, 255, 255};
 
-Vector3 moved(const Vector3& from, double by, const Vector3& along) {
-  return {from[0] + by * along[0], from[1] + by * along[1], from[2] + by * along[2]};
-}
-
-double dot(const Vector3& a, const Vector3& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-double length(const Vector3& a) {
-  return std::sqrt(dot(a, a));
-}
-
 std::uint8_t byte(double value) {
   return static_cast<std::uint8_t>(std::lround(255 * std::clamp(value, 0.0, 1.0)));
 }
@@ -54,6 +42,27 @@ void Canvas::trace(std::int64_t column, std::int64_t row,
     for (std::int64_t x = 0; x + 1 < side_; ++x)
       if (is_above(x, y) != is_above(x + 1, y) || is_above(x, y) != is_above(x, y + 1))
         pixel(column, row, x, y) = colour;
+}
+
+void Canvas::plot(std::int64_t column, std::int64_t row, std::span<const std::array<double, 2>> places,
+                  const Colour& colour) {
+  const auto dot = [&](double x, double y) {
+    const std::int64_t i = std::llround(std::floor(x * static_cast<double>(side_))),
+                       j = std::llround(std::floor(y * static_cast<double>(side_)));
+    if (i >= 0 && i < side_ && j >= 0 && j < side_) pixel(column, row, i, j) = colour;
+  };
+  const double width = 1 / static_cast<double>(side_);
+  for (std::size_t next = 1; next < places.size(); ++next) {
+    const auto [x, y] = places[next - 1];
+    const double across = places[next][0] - x, upwards = places[next][1] - y;
+    const double steps = std::ceil(2 * std::max(std::abs(across), std::abs(upwards)) / width) + 1;
+    for (double step = 0; step <= steps; ++step)
+      for (const double beside : {-width, 0.0, width}) {
+        const bool is_steep = std::abs(upwards) > std::abs(across);
+        dot(x + step / steps * across + (is_steep ? beside : 0),
+            y + step / steps * upwards + (is_steep ? 0 : beside));
+      }
+  }
 }
 
 void Canvas::save(const std::filesystem::path& file) const {
@@ -94,37 +103,6 @@ Vector3 Interpolated::extent_mm() const {
   Vector3 extent;
   for (std::size_t e = 0; e < 3; ++e) extent[e] = static_cast<double>(grid_.size[e]) * grid_.spacing_mm[e];
   return extent;
-}
-
-Colour surface_colour(const Interpolated& rho, double isovalue, double x, double y) {
-  constexpr Vector3 kRight{0.8, 0.6, 0}, kUp{-0.24, 0.32, 0.9165}, kAway{-0.55, 0.7333, -0.4};
-  constexpr Vector3 kToLight{0.45, -0.45, 0.77};
-  const Vector3 box = rho.extent_mm();
-  const double reach = *std::ranges::max_element(box);
-  const double step = 0.4 * *std::ranges::min_element(rho.grid().spacing_mm);
-  const Vector3 centre{box[0] / 2, box[1] / 2, box[2] / 2};
-  const Vector3 middle = moved(moved(centre, (x - 0.5) * reach, kRight), (y - 0.5) * reach, kUp);
-  const auto is_in_box = [&](const Vector3& place) {
-    for (std::size_t e = 0; e < 3; ++e)
-      if (place[e] < 0 || place[e] > box[e]) return false;
-    return true;
-  };
-  for (double depth = -reach; depth < reach; depth += step) {
-    const Vector3 place = moved(middle, depth, kAway);
-    if (!is_in_box(place) || rho.at(place) <= isovalue) continue;
-    const double before = rho.at(moved(middle, depth - step, kAway)), here = rho.at(place);
-    const Vector3 hit =
-        before < isovalue ? moved(place, -step * (here - isovalue) / (here - before), kAway) : place;
-    Vector3 normal;
-    for (std::size_t e = 0; e < 3; ++e) {
-      Vector3 axis{};
-      axis[e] = rho.grid().spacing_mm[e];
-      normal[e] = (rho.at(moved(hit, -1, axis)) - rho.at(moved(hit, 1, axis))) / axis[e];
-    }
-    const double light = std::max(0.0, dot(normal, kToLight) / std::max(length(normal), 1e-12));
-    return {byte(0.20 + 0.70 * light), byte(0.25 + 0.65 * light), byte(0.30 + 0.55 * light)};
-  }
-  return {235, 235, 240};
 }
 
 }  // namespace volsmooth

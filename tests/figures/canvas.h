@@ -22,6 +22,10 @@ class Canvas {
   void trace(std::int64_t column, std::int64_t row, const std::function<double(double x, double y)>& value,
              double level, const Colour& colour);
 
+  /// Straight lines from place to place, three pixels wide.
+  void plot(std::int64_t column, std::int64_t row, std::span<const std::array<double, 2>> places,
+            const Colour& colour);
+
   void save(const std::filesystem::path& file) const;
 
  private:
@@ -52,9 +56,5 @@ class Interpolated {
   std::span<const float> voxels_;
   Grid grid_;
 };
-
-/// The isosurface as it is seen from above, before and right of the box, lit from above the eye; for
-/// `Canvas::paint`. Inside is above `isovalue`.
-Colour surface_colour(const Interpolated& rho, double isovalue, double x, double y);
 
 }  // namespace volsmooth

@@ -11,8 +11,7 @@
 namespace volsmooth {
 namespace {
 
-constexpr std::int64_t kCells = 128;
-constexpr double kSpacing = 1.0 / kCells, kRadius = 0.15, kStep = 0.05;
+constexpr double kRadius = 0.15, kStep = 0.05;
 constexpr int kSteps = 120, kStepsToFrame = 30;
 
 double distance_to_circle(double x, double y) {
@@ -25,17 +24,16 @@ std::array<double, 2> velocity_of_vortex(double x, double y) {
 }
 
 /// The part of each cell inside the circle, from 8 x 8 points.
-std::vector<double> density_of_circle() {
+PlaneField density_of_circle(std::int64_t cells, double spacing) {
   constexpr int kPoints = 8;
-  const PlaneField field = sampled_in_plane({kCells, kCells}, kSpacing, [](double x, double y) {
+  return sampled_in_plane({cells, cells}, spacing, [=](double x, double y) {
     int inside = 0;
     for (int j = 0; j < kPoints; ++j)
       for (int i = 0; i < kPoints; ++i)
-        inside += distance_to_circle(x + kSpacing * ((i + 0.5) / kPoints - 0.5),
-                                     y + kSpacing * ((j + 0.5) / kPoints - 0.5)) < 0;
+        inside += distance_to_circle(x + spacing * ((i + 0.5) / kPoints - 0.5),
+                                     y + spacing * ((j + 0.5) / kPoints - 0.5)) < 0;
     return static_cast<double>(inside) / (kPoints * kPoints);
   });
-  return field.values;
 }
 
 /// A curve that moves: what it is stored in, and how a frame of it looks.
@@ -50,12 +48,13 @@ class Contestant {
   double area() const { return is_level_set() ? enclosed_area(field_) : area_above(field_, level_); }
 
   double mass() const {
-    return std::accumulate(field_.values.begin(), field_.values.end(), 0.0) * kSpacing * kSpacing;
+    return std::accumulate(field_.values.begin(), field_.values.end(), 0.0) * field_.spacing * field_.spacing;
   }
 
   void paint(Canvas& canvas, std::int64_t column, std::int64_t row) const {
     const std::vector<float> voxels(field_.values.begin(), field_.values.end());
-    const Interpolated interpolated(voxels, {{kCells, kCells, 1}, {kSpacing, kSpacing, 1}});
+    const Interpolated interpolated(
+        voxels, {{field_.size[0], field_.size[1], 1}, {field_.spacing, field_.spacing, 1}});
     const auto value = [&](double x, double y) { return interpolated.at({x, y, 0}); };
     canvas.paint(column, row,
                  [&](double x, double y) { return grey(value(x, y), window_.first, window_.second); });
@@ -71,11 +70,12 @@ class Contestant {
   std::pair<double, double> window_;
 };
 
-std::vector<Contestant> contestants() {
-  const PlaneField distance = sampled_in_plane({kCells, kCells}, kSpacing, distance_to_circle);
-  const PlaneField density{{kCells, kCells}, kSpacing, density_of_circle()};
-  const auto advect_density = [](Reconstruction scheme) {
-    const Grid grid{{kCells, kCells, 1}, {kSpacing, kSpacing, kSpacing}};
+std::vector<Contestant> contestants(std::int64_t cells) {
+  const double spacing = 1 / static_cast<double>(cells);
+  const PlaneField distance = sampled_in_plane({cells, cells}, spacing, distance_to_circle);
+  const PlaneField density = density_of_circle(cells, spacing);
+  const auto advect_density = [=](Reconstruction scheme) {
+    const Grid grid{{cells, cells, 1}, {spacing, spacing, spacing}};
     return [scheme, grid, velocities = curl_on_faces<double>(grid, single_vortex)](PlaneField& rho) {
       advect<double>(rho.values, grid, velocities, kStep, scheme);
     };
@@ -85,8 +85,8 @@ std::vector<Contestant> contestants() {
     move(phi);
     redistance(phi);
   };
-  return {{distance, 0, move, {-kSpacing, kSpacing}},
-          {distance, 0, move_and_redistance, {-kSpacing, kSpacing}},
+  return {{distance, 0, move, {-spacing, spacing}},
+          {distance, 0, move_and_redistance, {-spacing, spacing}},
           {density, 0.5, advect_density(Reconstruction::kWeno5), {1, 0}},
           {density, 0.5, advect_density(Reconstruction::kWeno7), {1, 0}}};
 }
@@ -96,7 +96,7 @@ std::vector<Contestant> contestants() {
 /// Rows: level set; level set, redistanced every 0.05 units of time; density by WENO-5; by WENO-7. Columns:
 /// t = 0, 1.5, 3, 4.5, 6. Red: the curve.
 void draw_figure_4_2(const FigureOrder& order) {
-  auto all = contestants();
+  auto all = contestants(order.cells(128, 32));
   std::ofstream table(order.file("4.2.csv"));
   table << "time,area level set,area level set redistanced,area density weno-5,area density weno-7,"
            "mass density weno-5,mass density weno-7\n";
