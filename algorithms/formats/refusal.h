@@ -16,6 +16,8 @@ struct Refusal {
   std::string detail;
   std::map<std::string, double> numbers =
       {};  ///< members of the problem document, such as the number of bad voxels
+  std::map<std::string, std::map<std::string, double>> counts =
+      {};  ///< more members: how many there are of what, such as images by series
 };
 
 inline tl::unexpected<Refusal> refuse(std::string slug, std::string detail) {

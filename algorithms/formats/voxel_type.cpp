@@ -124,10 +124,13 @@ EncodeLoss& EncodeLoss::operator+=(const EncodeLoss& other) {
 }
 
 const VoxelType* find_voxel_type(int nifti_code) {
-  for (const VoxelType& type : kVoxelTypes) {
-    if (type.nifti_code == nifti_code) return &type;
-  }
-  return nullptr;
+  const auto found = std::ranges::find(kVoxelTypes, nifti_code, &VoxelType::nifti_code);
+  return found == kVoxelTypes.end() ? nullptr : &*found;
+}
+
+const VoxelType* find_voxel_type(std::string_view name) {
+  const auto found = std::ranges::find(kVoxelTypes, name, &VoxelType::name);
+  return found == kVoxelTypes.end() ? nullptr : &*found;
 }
 
 }  // namespace volsmooth

@@ -42,5 +42,6 @@ struct VoxelType {
 };
 
 const VoxelType* find_voxel_type(int nifti_code);
+const VoxelType* find_voxel_type(std::string_view name);
 
 }  // namespace volsmooth

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "algorithms/formats/dicom/geometry.h"
 #include "algorithms/formats/read_limits.h"
 #include "algorithms/formats/refusal.h"
 #include "algorithms/volume/geometry.h"
@@ -18,9 +19,13 @@ namespace volsmooth {
 class UploadedFiles;
 
 struct SeriesOptions {
-  std::string series;             ///< the Series Instance UID that is meant; may be empty where there is one
+  std::string series = {};        ///< the Series Instance UID that is meant; may be empty where there is one
   bool resample_uniform = false;  ///< uneven slices are interpolated linearly to even ones
-  ReadLimits limits;
+  ReadLimits limits = {};
+};
+
+struct ByteRange {
+  std::size_t offset = 0, length = 0;
 };
 
 /// One slice of a series: where its bytes are, where it lies and how its stored values become intensities.
@@ -31,7 +36,8 @@ struct DicomSlice {
   double rescale_slope = 1;
   double rescale_intercept = 0;
   std::optional<std::pair<std::int64_t, std::int64_t>> padding = {};  ///< stored values, inclusive
-  std::string sop_class_uid, sop_instance_uid;
+  std::string sop_class_uid, sop_instance_uid, transfer_syntax_uid;
+  std::vector<ByteRange> pixels;  ///< in its file: all of them, or the fragments of this frame
 };
 
 /// How the stored values of every slice of a series are kept.
@@ -55,8 +61,12 @@ struct DicomSeries {
   PixelFormat format;
   std::string modality, study_uid, series_uid, frame_of_reference_uid;
   double position_residual_mm = 0;  ///< the largest distance of a slice from the uniform affine
-  bool resampled = false;  ///< size[2] and map are of the grid that uneven slices are interpolated to
+  /// Where uneven slices are interpolated to even ones: what each slice of the volume is made of; else empty,
+  /// and the volume's slices are `slices`.
+  std::vector<Blend> blends;
   std::vector<std::string> warnings;
+
+  bool resampled() const { return !blends.empty(); }
 };
 
 /// Reads and checks everything but the pixels of an upload: every file is walked, one series picked, its
