@@ -27,6 +27,7 @@ constexpr int kUsageError = 2;
 struct Options {
   ServerSettings server;
   JobServiceSettings jobs;
+  std::filesystem::path ingest_program;
   std::string log_level = "info";
   bool ephemeral = false;
 };
@@ -60,6 +61,9 @@ void declare(CLI::App& app, Options& options) {
       ->envname("VOLSMOOTH_MAX_UPLOAD")
       ->transform(CLI::AsSizeValue(false))
       ->capture_default_str();
+  app.add_option("--ingest", options.ingest_program,
+                 "volsmooth-ingest, which reads DICOM; default: beside this program")
+      ->envname("VOLSMOOTH_INGEST");
   app.add_option("--log-level", options.log_level, "What is logged at least")
       ->envname("VOLSMOOTH_LOG_LEVEL")
       ->check(CLI::IsMember({"debug", "info", "warn", "error", "off"}))
@@ -114,7 +118,8 @@ void serve(const Options& options) {
   if (options.ephemeral) folder.emplace(options.jobs.data_dir);
 
   Metrics metrics;
-  JobService jobs(options.jobs, make_engine({.max_memory_bytes = options.jobs.memory_limit_bytes}));
+  JobService jobs(options.jobs, make_engine({.max_memory_bytes = options.jobs.memory_limit_bytes,
+                                             .ingest_program = options.ingest_program}));
   jobs.on_final([&metrics](const Job& job) {
     metrics.job_done(job);
     log_job(job);

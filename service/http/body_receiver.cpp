@@ -123,6 +123,11 @@ bool is_multipart(std::string_view content_type) {
   return lowered(content_type).starts_with("multipart/");
 }
 
+/// DICOM files as STOW-RS sends them (PS3.18, section 8.6): the body is kept whole, and read like any file.
+bool is_related(std::string_view content_type) {
+  return lowered(split(content_type, ';').front()) == "multipart/related";
+}
+
 bool is_json(std::string_view content_type) {
   return lowered(split(content_type, ';').front()) == "application/json";
 }
@@ -135,7 +140,8 @@ tl::expected<std::unique_ptr<BodyReceiver>, Problem> receiver_for(BodyKind kind,
   const auto declared = head.content_length;
   const auto type = head.header("content-type");
   const bool takes_form = kind == BodyKind::kFile || kind == BodyKind::kOrder;
-  const bool is_form = takes_form && is_multipart(type);
+  const bool is_related_file = kind == BodyKind::kFile && is_related(type);
+  const bool is_form = takes_form && is_multipart(type) && !is_related_file;
   const bool is_file = is_form || kind == BodyKind::kFile;
   const auto coding = lowered(head.header("content-encoding"));
 
@@ -159,7 +165,8 @@ tl::expected<std::unique_ptr<BodyReceiver>, Problem> receiver_for(BodyKind kind,
   const auto boundary = multipart_boundary(type);
   if (is_form && !boundary)
     return unsupported(
-        "The only multipart type here is multipart/form-data with a boundary of 1 to 70 characters.");
+        "The multipart types here are multipart/form-data with a boundary of 1 to 70 characters and, for a "
+        "volume alone, multipart/related.");
   auto file = rules.begin_upload(declared);
   if (!file) return tl::unexpected(file.error());
   request.file = std::move(*file);

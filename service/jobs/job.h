@@ -23,8 +23,8 @@ using Time = std::chrono::system_clock::time_point;
 struct UploadOptions {
   std::optional<std::int64_t> volume_index;
   std::optional<double> non_finite;
-  std::string series;    ///< DICOM series UID; not offered yet
-  std::string resample;  ///< "uniform"; not offered yet
+  std::string series;    ///< DICOM series UID, of several in one upload
+  std::string resample;  ///< "uniform": uneven DICOM slices are interpolated
 };
 
 /// What verification found in an uploaded file: the volume document without what storing adds.

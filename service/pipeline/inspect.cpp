@@ -33,9 +33,7 @@ VolumeFacts facts_of(const VolumeDescription& description) {
 tl::expected<VolumeFacts, Problem> inspect_upload(const std::filesystem::path& file,
                                                   const UploadOptions& options, const PipelineLimits& limits,
                                                   const Progress& report) {
-  const auto description = inspect_nifti(file, read_options(options, limits), report);
-  if (!description) return tl::unexpected(problem_from(description.error()));
-  return facts_of(*description);
+  return describe_volume(file, options, limits, report).map(facts_of);
 }
 
 }  // namespace volsmooth

@@ -16,6 +16,9 @@ constexpr double kBytesPerVoxelOfVolume = sizeof(float);
 /// (run_job.cpp).
 constexpr double kBytesPerVoxelOfSurface = 11;
 
+/// Of a DICOM volume: which voxels are padding, and what they held.
+constexpr double kBytesPerVoxelOfPadding = 4.125;
+
 constexpr std::int64_t kFixedBytes = std::int64_t{64} << 20;
 
 tl::expected<void, Problem> check_isovalue(const std::string& member, double isovalue,
@@ -88,8 +91,9 @@ tl::expected<JobPlan, Problem> plan_job(const JobOrder& order, const VolumeFacts
 
   const double volumes_held = parts.size() > 1 ? 2 : 1;
   const double surfaces = order.isovalues ? static_cast<double>(order.isovalues->size()) : 1;
-  const double bytes_per_voxel =
-      kBytesPerVoxelOfVolume * volumes_held + extra_bytes_per_voxel + kBytesPerVoxelOfSurface * surfaces;
+  const double padding = volume.format == "dicom" ? kBytesPerVoxelOfPadding : 0;
+  const double bytes_per_voxel = kBytesPerVoxelOfVolume * volumes_held + extra_bytes_per_voxel +
+                                 kBytesPerVoxelOfSurface * surfaces + padding;
   plan.memory_bytes = kFixedBytes + static_cast<std::int64_t>(std::ceil(voxels * bytes_per_voxel));
   if (limits.max_memory_bytes > 0 && plan.memory_bytes > limits.max_memory_bytes) {
     return tl::unexpected(

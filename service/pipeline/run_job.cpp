@@ -48,10 +48,11 @@ class JobRun {
 
   tl::expected<std::vector<Result>, Problem> run() {
     auto loaded = clock_.run("read", kReadCost * voxels_, [&](const Progress& progress) {
-      return read_nifti(task_.volume_file, read_options(task_.volume.options, limits_), progress);
+      return read_volume(task_.volume_file, task_.volume, limits_, progress);
     });
-    if (!loaded) return tl::unexpected(problem_from(loaded.error()));
+    if (!loaded) return tl::unexpected(loaded.error());
     description_ = std::move(loaded->description);
+    padding_ = std::move(loaded->padding);
     warnings_ = description_.warnings;
     original_ = loaded->volume;
 
@@ -132,14 +133,16 @@ class JobRun {
     return clock_.run("read", 0, [&](const Progress& progress) { return copy_of(*original_, progress); });
   }
 
-  WriteOutcome write_volume(const std::string& method, const Volume& volume, const Progress& progress) {
+  WriteOutcome write_volume(const std::string& method, Volume& volume, const Progress& progress) {
     const auto& outputs = task_.order.outputs;
     if (std::ranges::find(outputs, "nifti") == outputs.end()) return {};
     const auto type =
         task_.order.voxel_type == "float32" ? OutputVoxelType::kFloat32 : OutputVoxelType::kSame;
     const auto file = new_result(method + ".nii.gz", "volume", method, "application/gzip");
-    results_.back().frame = name_of(description_.map.frame);
+    results_.back().frame = name_of(Frame::kRas);
+    padding_.exchange(volume);
     const WriteOutcome written = write_nifti(file, volume, description_.header, type, progress);
+    padding_.exchange(volume);
     if (written.clipped_voxels > 0) {
       warnings_.push_back("clipped-voxels: " + std::to_string(written.clipped_voxels) + " voxels of " +
                           method + " were outside what " + description_.voxel_type + " can hold.");
@@ -225,6 +228,7 @@ class JobRun {
   StageClock clock_;
   VolumeDescription description_;
   Volume::Pointer original_;
+  Padding padding_;
   MiddleSlices original_slices_;
   std::vector<double> isovalues_;
   FoliationMeasures original_foliation_;

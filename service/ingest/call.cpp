@@ -1,0 +1,58 @@
+#include "service/ingest/call.h"
+
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <string>
+#include <system_error>
+
+namespace volsmooth {
+namespace {
+
+using Json = nlohmann::json;
+
+std::size_t size_of(int descriptor) {
+  struct stat status {};
+  if (::fstat(descriptor, &status) != 0)
+    throw std::system_error(errno, std::generic_category(), "the size of a descriptor");
+  return static_cast<std::size_t>(status.st_size);
+}
+
+SeriesOptions series_options(const Json& options) {
+  SeriesOptions series;
+  series.series = options.at("series").get<std::string>();
+  series.resample_uniform = options.at("resample").get<std::string>() == "uniform";
+  series.limits.max_voxels = options.at("max_voxels").get<std::int64_t>();
+  return series;
+}
+
+}  // namespace
+
+Json read_options() {
+  std::string text(size_of(kOptionsDescriptor), '\0');
+  if (::pread(kOptionsDescriptor, text.data(), text.size(), 0) != static_cast<ssize_t>(text.size()))
+    throw std::runtime_error("the options cannot be read");
+  return Json::parse(text);
+}
+
+IngestCall open_call(Json options) {
+  IngestCall call;
+  call.series = series_options(options);
+  call.options = std::move(options);
+  const std::size_t bytes = size_of(kUploadDescriptor);
+  if (bytes == 0) return call;
+  void* mapped = ::mmap(nullptr, bytes, PROT_READ, MAP_PRIVATE, kUploadDescriptor, 0);
+  if (mapped == MAP_FAILED) throw std::system_error(errno, std::generic_category(), "mapping the upload");
+  call.upload = {static_cast<const std::byte*>(mapped), bytes};
+  return call;
+}
+
+Json answer_of(const Refusal& refusal) {
+  Json members = refusal.numbers;
+  for (const auto& [name, counts] : refusal.counts) members[name] = counts;
+  return {{"refusal", {{"slug", refusal.slug}, {"detail", refusal.detail}, {"members", members}}}};
+}
+
+}  // namespace volsmooth

@@ -1,0 +1,17 @@
+#include "service/ingest/commands.h"
+
+#include <array>
+
+namespace volsmooth {
+namespace {
+
+constexpr std::array kCommands{IngestCommand{"inspect", answer_inspect},
+                               IngestCommand{"decode", answer_decode}};
+
+}  // namespace
+
+std::span<const IngestCommand> ingest_commands() {
+  return kCommands;
+}
+
+}  // namespace volsmooth

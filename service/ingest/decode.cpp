@@ -1,0 +1,82 @@
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <system_error>
+
+#include "service/ingest/commands.h"
+#include "service/ingest/volume_answer.h"
+
+namespace volsmooth {
+namespace {
+
+[[noreturn]] void fail(const char* what) {
+  throw std::system_error(errno, std::generic_category(), what);
+}
+
+/// The output as memory.
+std::span<float> map_output(std::int64_t voxels) {
+  const auto bytes = static_cast<std::size_t>(voxels) * sizeof(float);
+  if (::ftruncate(kOutputDescriptor, static_cast<off_t>(bytes)) != 0) fail("making room for the voxels");
+  void* mapped = ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_SHARED, kOutputDescriptor, 0);
+  if (mapped == MAP_FAILED) fail("mapping the voxels");
+  return {static_cast<float*>(mapped), static_cast<std::size_t>(voxels)};
+}
+
+void append(const void* bytes, std::size_t count) {
+  const char* next = static_cast<const char*>(bytes);
+  while (count > 0) {
+    const ssize_t written = ::write(kOutputDescriptor, next, count);
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) fail("writing the padding");
+    next += written;
+    count -= static_cast<std::size_t>(written);
+  }
+}
+
+/// Which voxels are padding, and their intensities.
+struct Padding {
+  std::vector<std::uint8_t> bits;
+  std::vector<float> intensities;
+
+  void mark(std::size_t voxel, float intensity) {
+    bits[voxel / 8] |= static_cast<std::uint8_t>(1U << voxel % 8);
+    intensities.push_back(intensity);
+  }
+};
+
+void fill(std::span<float> voxels, const Padding& padding, float intensity) {
+  for (std::size_t byte = 0; byte < padding.bits.size(); ++byte) {
+    if (padding.bits[byte] == 0) continue;
+    for (std::size_t bit = 0; bit < 8; ++bit)
+      if ((padding.bits[byte] >> bit & 1) != 0) voxels[8 * byte + bit] = intensity;
+  }
+}
+
+}  // namespace
+
+nlohmann::json answer_decode(const IngestCall& call) {
+  const auto series = read_series(call.upload, call.series);
+  if (!series) return answer_of(series.error());
+  const std::span<float> voxels = map_output(voxel_count(series->size));
+  Padding padding{std::vector<std::uint8_t>((voxels.size() + 7) / 8), {}};
+  const auto take = [&](std::int64_t slice, std::span<const float> intensities,
+                        std::span<const std::uint8_t> padded) {
+    const std::size_t first = static_cast<std::size_t>(slice) * intensities.size();
+    std::ranges::copy(intensities, voxels.begin() + static_cast<std::ptrdiff_t>(first));
+    for (std::size_t i = 0; i < padded.size(); ++i)
+      if (padded[i] != 0) padding.mark(first + i, intensities[i]);
+  };
+  const auto facts = decode_series(*series, take);
+  if (!facts) return answer_of(facts.error());
+  if (facts->padded_voxels > 0) {
+    fill(voxels, padding, static_cast<float>(facts->intensity_min));
+    if (::lseek(kOutputDescriptor, 0, SEEK_END) < 0) fail("finding the end of the voxels");
+    append(padding.bits.data(), padding.bits.size());
+    append(padding.intensities.data(), padding.intensities.size() * sizeof(float));
+  }
+  return volume_answer(*series, *facts);
+}
+
+}  // namespace volsmooth
