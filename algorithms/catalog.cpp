@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <type_traits>
 #include <utility>
 
 #include "algorithms/flows/conservative_mean_curvature_flow.h"
@@ -98,14 +99,39 @@ void resolve_surface(ParameterValues& resolved, const ParameterValues& asked, co
   resolved["half_width"] = number(asked, "half_width", tenth > 0 ? tenth : 1);
 }
 
-/// Runs `flow` on the volume, or on the density around its surface where one is named.
+/// Steps of sharpening after a flow gather what it has spread: a surface then encloses its mass again.
+ParameterInfo sharpening_reach_parameter() {
+  return {.name = "sharpening_reach_mm",
+          .description =
+              "How far, when the flow is over, the isosurfaces at the ends of the density move "
+              "towards the surface at the most; 0: not at all.",
+          .unit = "mm",
+          .minimum = 0,
+          .maximum = 2000,
+          .default_text = "the geometric mean of the spacing, where a surface is given",
+          .needs = "surface"};
+}
+
+void resolve_sharpening(ParameterValues& resolved, const ParameterValues& asked, const MethodInput& input) {
+  const double reach = number(asked, "sharpening_reach_mm", mean_spacing(input.grid));
+  resolved["sharpening_reach_mm"] = reach;
+  resolved["sharpening_steps"] =
+      reach > 0 ? static_cast<double>(plan(Sharpening{reach}, input.grid).steps) : 0;
+}
+
+/// Runs `flow` on the volume, or on the density around its surface where one is named, which may be sharpened
+/// then.
 template <class Flow>
 void smooth_as_asked(Volume& volume, const Flow& flow, const ParameterValues& resolved,
                      const Progress& report) {
   if (!resolved.contains("surface")) return smooth(volume, flow, report);
   const DensityWindow window{number(resolved, "surface"), number(resolved, "half_width")};
+  const double steps = number(resolved, "steps"), sharpening_steps = number(resolved, "sharpening_steps", 0);
+  const double flow_ends = 0.02 + 0.96 * steps / (steps + sharpening_steps);
   to_density(volume, window, part_of(report, 0, 0.02));
-  smooth(volume, flow, part_of(report, 0.02, 0.98));
+  smooth(volume, flow, part_of(report, 0.02, flow_ends));
+  if (sharpening_steps > 0)
+    smooth(volume, Sharpening{number(resolved, "sharpening_reach_mm")}, part_of(report, flow_ends, 0.98));
   to_intensity(volume, window, part_of(report, 0.98, 1));
 }
 
@@ -161,6 +187,8 @@ Method flow_method(std::string name, std::string description, Parameters more,
                 ParameterValues resolved = resolve_strength(asked, input);
                 if (asked.contains("scheme")) resolved["scheme"] = asked.at("scheme");
                 resolve_surface(resolved, asked, input);
+                if constexpr (std::is_same_v<Flow, ConservativeMeanCurvatureFlow>)
+                  if (asked.contains("surface")) resolve_sharpening(resolved, asked, input);
                 const StepPlan steps = plan(flow_of(resolved), input.grid);
                 resolved["step_mm2"] = steps.step_mm2;
                 resolved["steps"] = static_cast<double>(steps.steps);
@@ -276,7 +304,8 @@ std::vector<Method> make_catalog() {
       flow_method("conservative-mean-curvature-flow",
                   "Mean curvature flow from which the mean speed is taken off, so that the mass of the "
                   "whole volume does not change: noise goes, sizes stay.",
-                  {surface_parameter(), half_width_parameter()}, conservative_flow),
+                  {surface_parameter(), half_width_parameter(), sharpening_reach_parameter()},
+                  conservative_flow),
       flow_method("laplacian",
                   "The heat equation, a Gaussian of variance twice the flow time: smooths across edges as "
                   "well as along them.",

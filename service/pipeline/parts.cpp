@@ -37,8 +37,11 @@ std::optional<double> surface_of(const ParameterValues& parameters) {
 }
 
 double steps_of(const Part& part) {
-  const auto steps = part.parameters.find("steps");
-  return steps == part.parameters.end() ? 1 : std::get<double>(steps->second);
+  const auto number = [&](const char* name, double otherwise) {
+    const auto found = part.parameters.find(name);
+    return found == part.parameters.end() ? otherwise : std::get<double>(found->second);
+  };
+  return number("steps", 1) + number("sharpening_steps", 0);
 }
 
 }  // namespace volsmooth

@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <numeric>
+
 #include "algorithms/flows/mean_curvature_flow.h"
+#include "algorithms/flows/sharpening.h"
 #include "tests/support/phantoms.h"
 
 namespace volsmooth {
@@ -18,6 +21,17 @@ double number(const ParameterValues& values, const std::string& name) {
 bool declares(const Method& method, const std::string& name) {
   return std::ranges::find(method.info.parameters, name, &ParameterInfo::name) !=
          method.info.parameters.end();
+}
+
+/// Where values pass `level` on the way out from the middle along x.
+double radius_along_x(const Grid& grid, const std::vector<float>& values, double level) {
+  const float* row =
+      values.data() + (grid.size[2] / 2 * grid.size[1] + grid.size[1] / 2) * grid.size[0] + grid.size[0] / 2;
+  std::size_t x = 0;
+  while (double{row[x + 1]} >= level) ++x;
+  const double along =
+      static_cast<double>(x) + 0.5 + (row[x] - level) / (double{row[x]} - double{row[x + 1]});
+  return std::hypot(along, 0.5, 0.5);
 }
 
 /// The least that can be asked for.
@@ -92,7 +106,8 @@ TEST_P(CatalogRow, AcceptsItsOwnDefaultsForVoxelsOfAnySize) {
 TEST_P(CatalogRow, HasLimitsThatExcludeAbsurdLengths) {  // P1, P2
   for (const ParameterInfo& parameter : method().info.parameters) {
     if (!parameter.unit.starts_with("mm")) continue;
-    EXPECT_TRUE(parameter.minimum > 1e-300 || parameter.minimum == -parameter.maximum) << parameter.name;
+    const bool may_be_nothing = parameter.minimum == 0 || parameter.minimum == -parameter.maximum;
+    EXPECT_TRUE(parameter.minimum > 1e-300 || may_be_nothing) << parameter.name;
     EXPECT_LT(parameter.maximum, 1e9);
   }
 }
@@ -153,6 +168,42 @@ TEST_P(CatalogRow, OffersChoicesThatDiffer) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, CatalogRow, testing::Range<std::size_t>(0, catalog().size()));
+
+/// The flow widens a soft edge, and the surface then encloses too little. Sharpened, it comes back towards
+/// what the mass says, and the mass stays. Measured: the surface's radius of 8 mm falls by 0.16 and by 0.07.
+TEST(Catalog, SharpensTheSurfaceOfTheConservativeFlow) {
+  const Grid grid{{26, 26, 26}, {1, 1, 1}};
+  const Method& method = *find_method("conservative-mean-curvature-flow");
+  const auto before = sampled(grid, nested_spheres(grid, soft_step(8, 1.5, 1000)));
+  const auto smoothed = [&](ParameterValues asked) {
+    asked["surface"] = 500.0;
+    asked["half_width"] = 500.0;
+    asked["flow_time_mm2"] = 6.0;
+    auto volume = volume_of(grid, before);
+    method.run(*volume, method.resolve(asked, {grid, 0, 1000}), no_progress);
+    return values_of(*volume);
+  };
+  const auto sum = [](const std::vector<float>& values) {
+    return std::accumulate(values.begin(), values.end(), 0.0);
+  };
+  const auto lost = [&](const std::vector<float>& after) { return 8 - radius_along_x(grid, after, 500); };
+  const auto sharp = smoothed({}), soft = smoothed({{"sharpening_reach_mm", 0.0}});
+  EXPECT_NEAR(sum(sharp) / sum(before), 1, 1e-6);
+  EXPECT_GT(lost(soft), 0.1);
+  EXPECT_LT(lost(sharp), 0.7 * lost(soft));
+  EXPECT_EQ(smoothed({{"sharpening_reach_mm", 1.0}}), sharp);
+}
+
+TEST(Catalog, CountsTheStepsOfSharpening) {
+  const Method& method = *find_method("conservative-mean-curvature-flow");
+  const auto steps = [&](double reach_mm) {
+    return number(method.resolve({{"surface", 0.5}, {"sharpening_reach_mm", reach_mm}}, kInput),
+                  "sharpening_steps");
+  };
+  EXPECT_EQ(steps(0), 0);
+  EXPECT_EQ(steps(2), static_cast<double>(plan(Sharpening{2}, kGrid).steps));
+  EXPECT_FALSE(method.resolve({}, kInput).contains("sharpening_steps"));
+}
 
 TEST(Catalog, RunsMeanCurvatureFlowUnderItsName) {
   auto by_name = volume_of(kGrid, noise(kGrid.size, 1)), directly = copy_of(*by_name);

@@ -121,6 +121,17 @@ TEST(Plan, AnOffsetLongerThanTheVolumeIsRefused) {
   EXPECT_EQ(plan.error().members.at("member"), "distance_mm");
 }
 
+TEST(Plan, SharpeningAfterAFlowCosts) {
+  JobOrder asked = order("conservative-mean-curvature-flow", 1);
+  asked.parameters["surface"] = 300.0;
+  asked.parameters["sharpening_reach_mm"] = 2000.0;
+  PipelineLimits limits;
+  limits.max_voxel_steps = 100 * 256.0 * 256.0 * 256.0;
+  EXPECT_FALSE(plan_job(asked, head(), limits));
+  asked.parameters["sharpening_reach_mm"] = 1.0;
+  EXPECT_TRUE(plan_job(asked, head(), limits));
+}
+
 TEST(Plan, CompareCostsItsPartsTogether) {
   PipelineLimits limits;
   const auto flow = plan_job(order("mean-curvature-flow", 25), head(), limits);
