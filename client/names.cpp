@@ -58,14 +58,22 @@ std::string result_name(const nlohmann::json& result, const std::vector<Isovalue
 }
 
 std::vector<std::string> predicted_names(const NamePlan& plan) {
+  const bool any_surface = plan.isovalues.automatic || !plan.isovalues.values.empty();
+  const auto wanted = [&](const std::string& output) { return std::ranges::count(plan.outputs, output) > 0; };
   std::vector<std::string> names = {"report.json"};
   for (const std::string& part : plan.parts) {
-    if (std::ranges::count(plan.outputs, "nifti") > 0) names.push_back(part + ".nii.gz");
+    if (wanted("nifti")) names.push_back(part + ".nii.gz");
+    if (wanted("dicom-series")) names.push_back(part + "_dicom.zip");
+    if (wanted("dicom-surface-segmentation") && any_surface) names.push_back(part + "_surfaces.dcm");
     names.push_back(part + ".png");
+    for (const std::string format : {"stl", "obj"}) {
+      if (!wanted("dicom-" + format)) continue;
+      for (const Isovalue& isovalue : plan.isovalues.values)
+        names.push_back(part + "_iso" + isovalue.text + "_" + format + ".dcm");
+    }
   }
   std::vector<std::string> with_surfaces = plan.parts;
   if (plan.with_original) with_surfaces.emplace_back("original");
-  const bool any_surface = plan.isovalues.automatic || !plan.isovalues.values.empty();
   for (const std::string& part : with_surfaces) {
     for (const std::string& format : plan.mesh_formats) {
       if (format == kManySurfaces) {

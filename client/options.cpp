@@ -78,7 +78,9 @@ void add_order_options(CLI::App& app, OrderOptions& order) {
   app.add_option("--voxel-type", order.voxel_type,
                  "Voxels of the smoothed volume: same (as the input's) or float32")
       ->check(CLI::IsMember({"same", "float32"}));
-  add_list(app, "--outputs", order.outputs, "Files of the smoothed volume, such as nifti");
+  add_list(app, "--outputs", order.outputs,
+           "Files of the smoothed volume: nifti; of a DICOM input also dicom-series, dicom-stl, dicom-obj, "
+           "dicom-surface-segmentation");
   app.add_option_function<std::vector<std::string>>(
          "--set",
          [&order](const std::vector<std::string>& settings) {

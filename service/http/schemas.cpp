@@ -141,7 +141,9 @@ json order_schema(const std::vector<MethodInfo>& methods) {
       "mesh_formats": {"type": "array", "items": {"enum": ["stl", "ply", "obj", "glb"]}, "default": ["stl"]},
       "mesh_frame": {"enum": ["RAS", "LPS"], "description": "Default: the volume's own."},
       "voxel_type": {"enum": ["same", "float32"], "default": "same"},
-      "outputs": {"type": "array", "items": {"enum": ["nifti"]}, "default": ["nifti"]},
+      "outputs": {"type": "array", "default": ["nifti"],
+        "description": "All but nifti need a DICOM input.",
+        "items": {"enum": ["nifti", "dicom-series", "dicom-stl", "dicom-obj", "dicom-surface-segmentation"]}},
       "label": {"type": "string", "description": "Free text of yours."}}
   })json");
   order["properties"]["method"]["enum"] = names;

@@ -6,7 +6,8 @@ namespace volsmooth {
 namespace {
 
 constexpr std::array kCommands{IngestCommand{"inspect", answer_inspect},
-                               IngestCommand{"decode", answer_decode}};
+                               IngestCommand{"decode", answer_decode},
+                               IngestCommand{"derive", answer_derive}};
 
 }  // namespace
 

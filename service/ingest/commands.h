@@ -23,4 +23,9 @@ nlohmann::json answer_inspect(const IngestCall& call);
 /// voxel in order, float32.
 nlohmann::json answer_decode(const IngestCall& call);
 
+/// Makes a DICOM object, or a zip of a series, of the upload and of the input; the options' member "derive"
+/// says which:
+/// {"made": ...} or {"refusal": ...}.
+nlohmann::json answer_derive(const IngestCall& call);
+
 }  // namespace volsmooth

@@ -18,8 +18,8 @@ using Checked = tl::expected<void, Problem>;
 
 constexpr std::size_t kMostIsovalues = 32;
 constexpr std::size_t kLongestLabel = 200;
-constexpr std::array<std::string_view, 4> kDicomOutputs = {"dicom-series", "dicom-stl", "dicom-obj",
-                                                           "dicom-surface-segmentation"};
+constexpr std::array<std::string_view, 5> kOutputs = {"nifti", "dicom-series", "dicom-stl", "dicom-obj",
+                                                      "dicom-surface-segmentation"};
 
 /// A name from outside, fit to be shown: as it is when it is an identifier, else not at all.
 std::string shown(const std::string& name) {
@@ -142,11 +142,9 @@ Checked read_mesh_formats(const json& value, JobOrder& order) {
 Checked read_outputs(const json& value, JobOrder& order) {
   auto names = read_names("outputs", value);
   if (!names) return tl::unexpected(std::move(names.error()));
-  for (const std::string& name : *names) {
-    if (std::ranges::count(kDicomOutputs, name) > 0)
-      return bad("outputs", "[\"nifti\"] for this volume: DICOM outputs need a DICOM input");
-    if (name != "nifti") return bad("outputs", "a list of output names; offered is: nifti");
-  }
+  for (const std::string& name : *names)
+    if (std::ranges::count(kOutputs, name) == 0)
+      return bad("outputs", "a list of output names; offered are: " + joined(kOutputs));
   order.outputs = *std::move(names);
   return {};
 }

@@ -61,11 +61,21 @@ tl::expected<void, Problem> check_distance(const ParameterValues& resolved, cons
               {{"member", "distance_mm"}, {"minimum", -sides}, {"maximum", sides}, {"unit", "mm"}}});
 }
 
+tl::expected<void, Problem> check_outputs(const JobOrder& order, const VolumeFacts& volume) {
+  const auto is_dicom = [](const std::string& output) { return output.starts_with("dicom-"); };
+  if (volume.format == "dicom" || std::ranges::none_of(order.outputs, is_dicom)) return {};
+  return tl::unexpected(
+      Problem{"bad-parameter",
+              "'outputs' must be [\"nifti\"] or [] for this volume: DICOM outputs need a DICOM input.",
+              {{"member", "outputs"}}});
+}
+
 }  // namespace
 
 tl::expected<JobPlan, Problem> plan_job(const JobOrder& order, const VolumeFacts& volume,
                                         const PipelineLimits& limits) {
   if (const auto checked = check_isovalues(order, volume); !checked) return tl::unexpected(checked.error());
+  if (const auto checked = check_outputs(order, volume); !checked) return tl::unexpected(checked.error());
 
   const MethodInput input = input_of(volume);
   const auto voxels = static_cast<double>(voxel_count(input.grid.size));
@@ -89,7 +99,9 @@ tl::expected<JobPlan, Problem> plan_job(const JobOrder& order, const VolumeFacts
                 {{"estimate_voxel_steps", voxel_steps}, {"limit_voxel_steps", limits.max_voxel_steps}}});
   }
 
-  const double volumes_held = parts.size() > 1 ? 2 : 1;
+  // volsmooth-ingest is given a copy to make a DICOM series of.
+  const bool copied = std::ranges::count(order.outputs, "dicom-series") > 0;
+  const double volumes_held = (parts.size() > 1 ? 2 : 1) + (copied ? 1 : 0);
   const double surfaces = order.isovalues ? static_cast<double>(order.isovalues->size()) : 1;
   const double padding = volume.format == "dicom" ? kBytesPerVoxelOfPadding : 0;
   const double bytes_per_voxel = kBytesPerVoxelOfVolume * volumes_held + extra_bytes_per_voxel +

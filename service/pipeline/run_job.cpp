@@ -8,6 +8,7 @@
 #include "algorithms/surface/isosurface.h"
 #include "algorithms/surface/otsu.h"
 #include "algorithms/volume/parallel.h"
+#include "service/pipeline/dicom_results.h"
 #include "service/pipeline/parts.h"
 #include "service/pipeline/reading.h"
 #include "service/pipeline/report.h"
@@ -40,6 +41,7 @@ class JobRun {
         parts_(parts_of(task.order, task.parameters, input_of(task.volume.facts))),
         limits_(limits),
         surface_bytes_(limits.max_memory_bytes / 4),
+        dicom_(task, limits),
         voxels_(static_cast<double>(voxel_count(task.volume.facts.size))),
         clock_(
             total_cost(parts_, static_cast<double>(task.order.isovalues ? task.order.isovalues->size() : 1),
@@ -107,6 +109,7 @@ class JobRun {
   void run_part(const Part& part) {
     const std::string& name = part.method->info.name;
     const Volume::Pointer volume = volume_for(part);
+    dicom_.begin_method(name, part.parameters);
     FoliationRow foliation{name, part.parameters, original_foliation_, {}, {}};
     clock_.run("flow", kStepCost * steps_of(part) * voxels_,
                [&](const Progress& progress) { part.method->run(*volume, part.parameters, progress); });
@@ -115,6 +118,7 @@ class JobRun {
 
     clock_.run("write", kWriteCost * voxels_, [&](const Progress& progress) {
       foliation.written = write_volume(name, *volume, progress);
+      if (wanted("dicom-series")) write_dicom_series(name, *volume, progress);
       write_picture(new_result(name + ".png", "picture", name, "image/png"), original_slices_,
                     middle_slices(*volume, description_.map), isovalues_);
     });
@@ -124,6 +128,7 @@ class JobRun {
       measure_surface(name, surfaces[which], which);
     std::erase_if(surfaces, [](const Mesh& surface) { return surface.triangles.empty(); });
     write_meshes(name, surfaces);
+    write_dicom_surfaces(name, surfaces);
     foliation_rows_.push_back(std::move(foliation));
   }
 
@@ -134,8 +139,7 @@ class JobRun {
   }
 
   WriteOutcome write_volume(const std::string& method, Volume& volume, const Progress& progress) {
-    const auto& outputs = task_.order.outputs;
-    if (std::ranges::find(outputs, "nifti") == outputs.end()) return {};
+    if (!wanted("nifti")) return {};
     const auto type =
         task_.order.voxel_type == "float32" ? OutputVoxelType::kFloat32 : OutputVoxelType::kSame;
     const auto file = new_result(method + ".nii.gz", "volume", method, "application/gzip");
@@ -143,11 +147,52 @@ class JobRun {
     padding_.exchange(volume);
     const WriteOutcome written = write_nifti(file, volume, description_.header, type, progress);
     padding_.exchange(volume);
-    if (written.clipped_voxels > 0) {
-      warnings_.push_back("clipped-voxels: " + std::to_string(written.clipped_voxels) + " voxels of " +
-                          method + " were outside what " + description_.voxel_type + " can hold.");
-    }
+    if (written.clipped_voxels > 0) warn_of_clipped(written.clipped_voxels, method);
     return written;
+  }
+
+  void warn_of_clipped(std::int64_t voxels, const std::string& method) {
+    warnings_.push_back("clipped-voxels: " + std::to_string(voxels) + " voxels of " + method +
+                        " were outside what " + description_.voxel_type + " can hold.");
+  }
+
+  bool wanted(const std::string& output) const {
+    return std::ranges::find(task_.order.outputs, output) != task_.order.outputs.end();
+  }
+
+  void write_dicom_series(const std::string& method, const Volume& volume, const Progress& progress) {
+    const auto file = new_result(method + "_dicom.zip", "series", method, "application/zip");
+    results_.back().frame = name_of(Frame::kLps);
+    const std::int64_t clipped = dicom_.write_series(file, volume, progress);
+    if (clipped > 0 && !wanted("nifti")) warn_of_clipped(clipped, method);
+  }
+
+  void write_dicom_surfaces(const std::string& method, const std::vector<Mesh>& surfaces) {
+    if (surfaces.empty()) return;
+    clock_.run("write", 0, [&](const Progress& progress) {
+      for (const std::string format : {"stl", "obj"}) {
+        if (!wanted("dicom-" + format)) continue;
+        for (const Mesh& surface : surfaces) {
+          const std::string suffix = "_iso" + isovalue_text(surface.isovalue) + "_" + format + ".dcm";
+          const auto file = new_dicom_result(method + suffix, method, std::span(&surface, 1));
+          dicom_.write_mesh(file, format, surface, progress);
+        }
+      }
+      if (wanted("dicom-surface-segmentation")) {
+        const auto file = new_dicom_result(method + "_surfaces.dcm", method, surfaces);
+        results_.back().many_surfaces = true;
+        dicom_.write_segmentation(file, surfaces, progress);
+      }
+      progress(1);
+    });
+  }
+
+  std::filesystem::path new_dicom_result(const std::string& name, const std::string& method,
+                                         std::span<const Mesh> surfaces) {
+    const auto file = new_result(name, "dicom", method, "application/dicom");
+    for (const Mesh& surface : surfaces) results_.back().isovalues.push_back(surface.isovalue);
+    results_.back().frame = name_of(Frame::kLps);
+    return file;
   }
 
   void measure_surface(const std::string& method, const Mesh& surface, std::size_t which) {
@@ -224,6 +269,7 @@ class JobRun {
   const PipelineLimits& limits_;
   const std::int64_t
       surface_bytes_;  ///< that one surface may take: its job holds it, the original's and a search tree
+  DicomResults dicom_;
   const double voxels_;
   StageClock clock_;
   VolumeDescription description_;
@@ -249,6 +295,8 @@ tl::expected<std::vector<Result>, Problem> run_job(const ComputeTask& task, cons
   tl::expected<std::vector<Result>, Problem> outcome;
   try {
     with_threads(task.threads, [&] { outcome = JobRun(task, report, limits).run(); });
+  } catch (const DeriveRefused& refused) {
+    return tl::unexpected(refused.problem);
   } catch (const SurfaceTooLarge& surface) {
     return tl::unexpected(
         Problem{"job-too-large",

@@ -77,6 +77,20 @@ TEST(PredictedNames, LeaveOutWhatOnlyTheServerKnows) {
               UnorderedElementsAre("report.json", "laplacian.png", "laplacian.nii.gz"));
 }
 
+TEST(PredictedNames, OfDicomOutputs) {
+  NamePlan plan{.parts = {"laplacian"},
+                .mesh_formats = {},
+                .outputs = {"dicom-series", "dicom-stl", "dicom-obj", "dicom-surface-segmentation"},
+                .isovalues = {false, {{"40", 40}}}};
+  EXPECT_THAT(
+      predicted_names(plan),
+      UnorderedElementsAre("report.json", "laplacian.png", "laplacian_dicom.zip", "laplacian_iso40_stl.dcm",
+                           "laplacian_iso40_obj.dcm", "laplacian_surfaces.dcm"));
+  plan.isovalues = {false, {}};
+  EXPECT_THAT(predicted_names(plan),
+              UnorderedElementsAre("report.json", "laplacian.png", "laplacian_dicom.zip"));
+}
+
 TEST(Stems, OfTwoInputsMustDiffer) {
   EXPECT_TRUE(check_stems({"a/x.nii", "a/y.nii"}));
   const auto same = check_stems({"a/x.nii", "b/y.nii", "c/x.nii.gz"});

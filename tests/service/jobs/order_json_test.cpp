@@ -94,7 +94,7 @@ const OrderRow kRefused[] = {
     {"mesh_frame_case", with(R"("mesh_frame": "ras")"), "bad-parameter", "mesh_frame"},
     {"voxel_type", with(R"("voxel_type": "float64")"), "bad-parameter", "voxel_type"},
     {"output_unknown", with(R"("outputs": ["exe"])"), "bad-parameter", "outputs"},
-    {"output_dicom", with(R"("outputs": ["nifti", "dicom-series"])"), "bad-parameter", "outputs"},
+    {"output_twice", with(R"("outputs": ["nifti", "nifti"])"), "bad-parameter", "outputs"},
     {"label_number", with(R"("label": 5)"), "bad-parameter", "label"},
     {"label_201", label(std::string(201, 'a')), "bad-parameter", "label"},
     {"label_newline", label("a\\nb"), "bad-parameter", "label"},

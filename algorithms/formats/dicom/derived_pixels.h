@@ -1,0 +1,24 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "algorithms/formats/dicom/series.h"
+
+namespace volsmooth {
+
+/// The intensities of slice `which` of the series in a volume of its size: a slice of the volume, or two
+/// mixed where the series was resampled.
+std::vector<float> plane_at_slice(const DicomSeries& series, std::span<const float> intensities,
+                                  std::size_t which);
+
+/// Stored values of a slice, little-endian, behind `into`. `padding_of`: the stored values that the slice
+/// had, of which those that are padding are written again; empty where it has none. The number of clipped
+/// voxels.
+std::int64_t append_stored(std::span<const float> intensities, const DicomSlice& slice,
+                           const PixelFormat& format, std::span<const std::int32_t> padding_of,
+                           std::vector<std::byte>& into);
+
+}  // namespace volsmooth
