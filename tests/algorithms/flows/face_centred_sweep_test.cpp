@@ -100,13 +100,13 @@ INSTANTIATE_TEST_SUITE_P(Grids, OnAnyGrid,
                          testing::Values(GridCase{"Cubes", {{36, 36, 36}, {1, 1, 1}}},
                                          GridCase{"OneToFive", {{86, 86, 18}, {4.0 / 15, 4.0 / 15, 4.0 / 3}}},
                                          GridCase{"Sheared", {{44, 40, 40}, {1, 1, 1}, {0, kTilt, 0}}},
-                                         GridCase{"Tilted", {{60, 72, 32}, {0.5, 0.5, 1}, {kTilt, 0, 0}}},
+                                         GridCase{"Tilted", {{50, 58, 26}, {0.6, 0.6, 1.2}, {kTilt, 0, 0}}},
                                          GridCase{"Skew", {{44, 44, 44}, {1, 1, 1}, {-kTilt, kTilt, 0.1}}}),
                          [](const auto& row) { return std::string(row.param.name); });
 
-/// A ball of 8 of the longest steps, or of 6 where they are many, shrinks to 0.8 of its radius: every voxel
-/// near the .5 surface lies where the law says, to 1 % of the radius. Measured: 0.2 % at right angles, up to
-/// 0.8 % on the skew axes.
+/// A ball of 8 of the longest steps, or 6 to 7 where they are many, shrinks to 0.8 of its radius: every voxel
+/// near the .5 surface lies where the law says, to 1 % of the radius. Measured: 0.2 to 0.4 % at right angles,
+/// up to 0.8 % on the skew axes.
 TEST_P(OnAnyGrid, ABallShrinksByTheSameLaw) {
   constexpr double kRadius = 8, kTime = 0.09 * kRadius * kRadius;
   Grid grid = GetParam().grid;
