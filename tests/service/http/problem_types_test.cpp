@@ -16,7 +16,8 @@ namespace fs = std::filesystem;
 
 /// Every slug that a source file gives to a problem or a refusal, as it stands there.
 std::set<std::string> slugs_in_sources() {
-  static const std::regex in_code(R"rx((?:Problem|refuse|refuse_dicom|Refusal|Refused)\s*[({]+\s*"([a-z][a-z0-9-]+)")rx");
+  static const std::regex in_code(
+      R"rx((?:Problem|refuse|refuse_dicom|Refusal|Refused)\s*[({]+\s*"([a-z][a-z0-9-]+)")rx");
   const fs::path root = VOLSMOOTH_SOURCE_DIR;
   std::set<std::string> slugs;
   for (const char* part : {"service", "algorithms"})
