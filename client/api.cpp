@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "client/descriptor.h"
+#include "client/packed_folder.h"
 
 namespace volsmooth {
 namespace {
@@ -65,18 +66,37 @@ Expected<nlohmann::json> Api::methods() {
   return document({.target = "/v1/methods"});
 }
 
-Expected<nlohmann::json> Api::upload(const std::filesystem::path& file, const Query& options,
+Expected<nlohmann::json> Api::upload(const std::filesystem::path& input, const Query& options,
                                      const Sent& on_sent) {
+  std::error_code ignored;
+  return std::filesystem::is_directory(input, ignored) ? upload_folder(input, options, on_sent)
+                                                       : upload_file(input, options, on_sent);
+}
+
+Expected<nlohmann::json> Api::upload_folder(const std::filesystem::path& folder, const Query& options,
+                                            const Sent& on_sent) {
+  const auto packed = pack_folder(folder);
+  if (!packed) return tl::unexpected(packed.error());
+  return upload_body(packed->body, packed->bytes, packed->content_type, options, on_sent);
+}
+
+Expected<nlohmann::json> Api::upload_file(const std::filesystem::path& file, const Query& options,
+                                          const Sent& on_sent) {
   const Descriptor descriptor(open(file.c_str(), O_RDONLY | O_CLOEXEC));
   struct stat status {};
   if (!descriptor || fstat(descriptor.get(), &status) != 0) {
     return fail(ExitCode::kNoInput, file.string() + " cannot be read: " + std::strerror(errno) + ".");
   }
-  const std::int64_t bytes = status.st_size;
+  return upload_body(descriptor, status.st_size, "application/octet-stream", options, on_sent);
+}
+
+Expected<nlohmann::json> Api::upload_body(const Descriptor& descriptor, std::int64_t bytes,
+                                          const std::string& content_type, const Query& options,
+                                          const Sent& on_sent) {
   const FileBody body{descriptor.get(), bytes, [&](std::int64_t sent) { on_sent(sent, bytes); }};
   return document({.method = "POST",
                    .target = target_of("/v1/volumes", options),
-                   .content_type = "application/octet-stream",
+                   .content_type = content_type,
                    .file = &body});
 }
 

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/descriptor.h"
 #include "client/http.h"
 
 namespace volsmooth {
@@ -25,7 +26,8 @@ class Api {
   using Sent = std::function<void(std::int64_t sent, std::int64_t bytes)>;
 
   Expected<Json> methods();
-  Expected<Json> upload(const std::filesystem::path& file, const Query& options, const Sent& on_sent);
+  /// A folder is packed first (packed_folder.h).
+  Expected<Json> upload(const std::filesystem::path& input, const Query& options, const Sent& on_sent);
   Expected<Json> volumes();
   Expected<Json> volume(std::string_view id);
   Expected<void> delete_volume(std::string_view id);
@@ -40,6 +42,11 @@ class Api {
                           const std::function<Expected<void>(std::string_view)>& sink);
 
  private:
+  Expected<Json> upload_file(const std::filesystem::path& file, const Query& options, const Sent& on_sent);
+  Expected<Json> upload_folder(const std::filesystem::path& folder, const Query& options,
+                               const Sent& on_sent);
+  Expected<Json> upload_body(const Descriptor& body, std::int64_t bytes, const std::string& content_type,
+                             const Query& options, const Sent& on_sent);
   Expected<Json> document(const Request& request);
   Expected<void> nothing(const Request& request);
   Expected<Response> success(const Request& request);

@@ -66,12 +66,12 @@ Expected<std::vector<std::string>> names_of(const Json& results, const Fetching&
 Expected<Json> upload_volume(const Session& session, const std::filesystem::path& input, const Query& query) {
   ProgressBar bar(!session.console.quiet);
   auto volume = session.api.upload(input, query, [&](std::int64_t sent, std::int64_t bytes) {
-    bar.show(view_of_transfer(input.filename().string(), sent < bytes ? "upload" : "check", sent, bytes));
+    bar.show(view_of_transfer(name_of(input), sent < bytes ? "upload" : "check", sent, bytes));
   });
   bar.wipe();
   if (!volume) return volume;
   for (const Json& warning : volume->value("warnings", Json::array())) {
-    session.console.warn(input.filename().string() + ": " +
+    session.console.warn(name_of(input) + ": " +
                          (warning.is_string() ? warning.get<std::string>() : warning.dump()));
   }
   return volume;

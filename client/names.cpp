@@ -29,9 +29,17 @@ std::string_view after_number(std::string_view text) {
 
 }  // namespace
 
+std::string name_of(const std::filesystem::path& input) {
+  std::error_code ignored;
+  std::filesystem::path path = input.lexically_normal();
+  if (!path.has_filename()) path = path.parent_path();
+  if (path == "." || path == "..") path = std::filesystem::canonical(input, ignored);
+  return path.filename().string();
+}
+
 std::string stem_of(const std::filesystem::path& input) {
-  const std::string name = input.filename().string();
-  for (const std::string_view extension : {".nii.gz", ".nii"}) {
+  const std::string name = name_of(input);
+  for (const std::string_view extension : {".nii.gz", ".nii", ".zip", ".dcm"}) {
     if (name.size() > extension.size() && ends_with_ignoring_case(name, extension)) {
       return name.substr(0, name.size() - extension.size());
     }

@@ -11,7 +11,10 @@
 
 namespace volsmooth {
 
-/// The file name without .nii or .nii.gz: what the names of its results begin with.
+/// The name of a file or folder, also where its path ends with a slash.
+std::string name_of(const std::filesystem::path& input);
+
+/// The same without .nii, .nii.gz, .zip or .dcm: what the names of its results begin with.
 std::string stem_of(const std::filesystem::path& input);
 
 /// A name from a server goes to the disk only if it is a plain file name.

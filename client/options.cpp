@@ -108,7 +108,7 @@ void add_upload_options(CLI::App& app, Options& options) {
   add_query(app, options, "--volume-index", "volume_index", "Which volume of a 4-D file, from 0")
       ->check(CLI::NonNegativeNumber);
   add_query(app, options, "--series", "series", "Which of several DICOM series, by UID");
-  add_query(app, options, "--resample", "resample", "uniform: allow uneven slices")
+  add_query(app, options, "--resample", "resample", "uniform: interpolate uneven DICOM slices to even ones")
       ->check(CLI::IsMember({"uniform"}));
   add_query(app, options, "--non-finite", "non_finite", "Value that replaces NaN and infinities")
       ->check(CLI::Number);
@@ -121,7 +121,10 @@ void add_output_options(CLI::App& app, Options& options) {
 
 void add_smooth(CLI::App& app, Options& options) {
   auto& smooth = *app.add_subcommand("smooth", "Smooth volumes and write the results into a folder");
-  smooth.add_option("INPUT", options.inputs, "NIfTI files")->required();
+  smooth
+      .add_option("INPUT", options.inputs,
+                  "NIfTI files; DICOM: a folder, a zip or a multi-frame file for each volume")
+      ->required();
   add_output_options(smooth, options);
   add_order_options(smooth, options.order);
   add_upload_options(smooth, options);
@@ -129,7 +132,9 @@ void add_smooth(CLI::App& app, Options& options) {
 
 void add_volume_commands(CLI::App& app, Options& options) {
   auto& upload = *app.add_subcommand("upload", "Send a volume to the server; prints its id");
-  upload.add_option("FILE", options.inputs, "NIfTI file")->required()->expected(1);
+  upload.add_option("FILE", options.inputs, "NIfTI file; DICOM: a folder, a zip or a multi-frame file")
+      ->required()
+      ->expected(1);
   add_upload_options(upload, options);
   app.add_subcommand("volumes", "List the volumes on the server");
 }

@@ -63,7 +63,7 @@ Expected<void> smooth_one(const Options& options, const Session& session, const 
   const auto volume = upload_volume(session, input, options.query);
   if (!volume) return tl::unexpected(volume.error());
   const auto volume_id = volume->at("id").get<std::string>();
-  auto job = run_job(options, session, volume_id, input.filename().string());
+  auto job = run_job(options, session, volume_id, name_of(input));
   if (!job) {
     static_cast<void>(session.api.delete_volume(volume_id));  // a job that goes on all the same keeps it
     return tl::unexpected(job.error());
@@ -86,15 +86,11 @@ Expected<void> smooth_one(const Options& options, const Session& session, const 
 Expected<void> check_inputs(const std::vector<std::filesystem::path>& inputs) {
   for (const auto& input : inputs) {
     std::error_code error;
-    if (std::filesystem::is_directory(input, error)) {
-      return fail(ExitCode::kBadData,
-                  input.string() + " is a folder; DICOM series are not read yet, so give NIfTI files.");
-    }
     if (access(input.c_str(), R_OK) != 0) {
       return fail(ExitCode::kNoInput, input.string() + " cannot be read: " + std::strerror(errno) + ".");
     }
-    if (!std::filesystem::is_regular_file(input, error)) {
-      return fail(ExitCode::kNoInput, input.string() + " is not a file.");
+    if (!std::filesystem::is_regular_file(input, error) && !std::filesystem::is_directory(input, error)) {
+      return fail(ExitCode::kNoInput, input.string() + " is neither a file nor a folder.");
     }
   }
   return {};

@@ -9,8 +9,8 @@ namespace volsmooth {
 /// the others from being smoothed; anything else ends the command. An interruption cancels the job first.
 Expected<void> smooth(const Options& options, const Session& session);
 
-/// What can be said before a server is asked: inputs that are missing (kNoInput) or folders (kBadData), or
-/// whose results would get the same names (kUsage).
+/// What can be said before a server is asked: inputs that are missing (kNoInput), or whose results
+/// would get the same names (kUsage).
 Expected<void> check_inputs(const std::vector<std::filesystem::path>& inputs);
 
 }  // namespace volsmooth

@@ -21,7 +21,9 @@ TEST_P(Stem, IsTheFileNameWithoutTheFormat) {
 INSTANTIATE_TEST_SUITE_P(Paths, Stem,
                          testing::Values(StemCase{"/a/ch2.nii.gz", "ch2"}, StemCase{"ch2.nii", "ch2"},
                                          StemCase{"CH2.NII.GZ", "CH2"}, StemCase{"a.b.nii.gz", "a.b"},
-                                         StemCase{"scan.dcm", "scan.dcm"}, StemCase{"scan", "scan"},
+                                         StemCase{"scan.dcm", "scan"}, StemCase{"scan.ZIP", "scan"},
+                                         StemCase{"series/", "series"}, StemCase{"/a/CT.5/", "CT.5"},
+                                         StemCase{"a/../b/.", "b"}, StemCase{"scan", "scan"},
                                          StemCase{".nii.gz", ".nii.gz"}, StemCase{"x.gz", "x.gz"}));
 
 nlohmann::json surface(const std::string& name, double isovalue) {

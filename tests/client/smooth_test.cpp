@@ -244,7 +244,7 @@ TEST(Inputs, AreCheckedFirst) {
   const auto file = folder.put("x.nii", "");
   EXPECT_TRUE(check_inputs({file}));
   EXPECT_EQ(check_inputs({file, folder / "missing.nii"}).error().code, ExitCode::kNoInput);
-  EXPECT_EQ(check_inputs({folder.path()}).error().code, ExitCode::kBadData);
+  EXPECT_TRUE(check_inputs({folder.path()})) << "a series";
   EXPECT_EQ(check_inputs({"/dev/null"}).error().code, ExitCode::kNoInput);
 }
 

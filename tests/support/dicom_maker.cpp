@@ -7,6 +7,8 @@
 #include <cstring>
 #include <set>
 
+#include "tests/support/zip_maker.h"
+
 namespace volsmooth::test {
 namespace {
 
@@ -275,6 +277,14 @@ DicomDataset enhanced_of(const SeriesPhantom& phantom) {
   set.sequence(0x52009230, std::move(frames));
   set[0x7fe00010] = {"OW", std::move(pixels)};
   return set;
+}
+
+std::string zip_of(const std::vector<std::string>& files) {
+  ZipFile zip;
+  for (const std::string& file : files)
+    zip.entries.emplace_back("series/IM" + std::to_string(zip.entries.size()), bytes_of_text(file));
+  const ByteVector bytes = bytes_of(zip);
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
 std::string multipart_of(const std::vector<std::string>& files, const std::string& boundary) {

@@ -68,7 +68,8 @@ std::vector<std::string> files_of(const std::vector<DicomDataset>& datasets,
 /// The same series as one Enhanced CT multi-frame file.
 DicomDataset enhanced_of(const SeriesPhantom& phantom);
 
-/// A multipart/related body of application/dicom parts, and its boundary's name.
+/// An archive, or a multipart/related body of application/dicom parts.
+std::string zip_of(const std::vector<std::string>& files);
 std::string multipart_of(const std::vector<std::string>& files,
                          const std::string& boundary = "volsmooth-part");
 

@@ -17,6 +17,7 @@ namespace {
 
 using namespace std::string_view_literals;
 
+constexpr std::int64_t kFreeInflatedBytes = std::int64_t{32} << 20;  // of one file, whatever the ratio
 constexpr std::size_t kInflatedAtOnce = std::size_t{1} << 20;
 
 std::span<const std::byte> bytes_of(std::string_view text) {
@@ -28,7 +29,8 @@ ZipLimits zip_limits(const ReadLimits& limits) {
 }
 
 void check_inflated(std::size_t inflated, std::size_t deflated, const ReadLimits& limits) {
-  const bool over = inflated > static_cast<std::size_t>(limits.free_inflated_bytes) &&
+  const auto free = static_cast<std::size_t>(std::min(limits.free_inflated_bytes, kFreeInflatedBytes));
+  const bool over = inflated > free &&
                     static_cast<double>(inflated) > limits.max_inflate_ratio * static_cast<double>(deflated);
   if (over) refuse_dicom("decompression-limit", "A deflated DICOM file inflates to far more than its size.");
 }

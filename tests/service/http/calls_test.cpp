@@ -244,6 +244,16 @@ TEST_F(Calls, FormUploadsAndSubmitsInEitherOrder) {
   }
 }
 
+TEST_F(Calls, RelatedPartsAreKeptAsTheyCame) {
+  const std::string body = "--B\r\nContent-Type: application/dicom\r\n\r\nvoxels\r\n--B--\r\n";
+  const auto answer = ask("POST /v1/volumes", body,
+                          "Content-Type: multipart/related; type=\"application/dicom\"; boundary=B\r\n");
+  ASSERT_EQ(answer.status, 201);
+  const std::string id = json::parse(answer.body).at("id");
+  EXPECT_EQ(ask("GET /v1/volumes/" + id + "/content").body, body);
+  EXPECT_EQ(ask("POST /v1/jobs", body, "Content-Type: multipart/related; boundary=B\r\n").status, 415);
+}
+
 TEST_F(Calls, FailedFormLeavesNoVolumeBehind) {
   const std::vector<std::pair<std::string, std::string>> forms = {
       {form("voxels", R"({"method":"none"})"), "unknown-algorithm"},

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/support/bad_dicom.h"
 #include "tests/system/bad_input/bad_uploads.h"
 #include "tests/system/bad_input/survivor.h"
 
@@ -22,6 +23,37 @@ TEST(BadUploads, EveryUploadGetsItsAnswer) {
     if (warning.empty()) continue;
     EXPECT_THAT(warnings.get<std::vector<std::string>>(), testing::Contains(testing::StartsWith(warning)));
   }
+}
+
+/// Each is read in a process of its own; the daemon that starts them stays the same.
+TEST(BadUploads, EveryUploadOfDicomGetsItsAnswer) {
+  for (const auto& [name, file, status, slug, query, warning] : dicom_uploads()) {
+    SCOPED_TRACE(name);
+    const std::string target = "/v1/volumes" + (query.empty() ? query : "?" + query);
+    const HttpResponse answer = survivor().service().call("POST", target, file());
+    EXPECT_EQ(answer.body.find("PLANTED"), std::string::npos);
+    if (!slug.empty()) {
+      expect_problem(answer, status, slug);
+      continue;
+    }
+    ASSERT_EQ(answer.status, status) << answer.body;
+    const auto warnings = answer.document().at("warnings").get<std::vector<std::string>>();
+    if (warning.empty()) continue;
+    EXPECT_THAT(warnings, testing::Contains(testing::StartsWith(warning)));
+  }
+  EXPECT_EQ(survivor().daemon().log().find("PLANTED"), std::string::npos);
+}
+
+TEST(BadUploads, ADeflatedBombIsNotInflated) {  // D17
+  expect_problem(survivor().service().call("POST", "/v1/volumes", deflated_bomb()), 413,
+                 "decompression-limit");
+}
+
+TEST(BadUploads, OptionsOfAnotherFormatAreRefused) {
+  const ServiceClient service = survivor().service();
+  expect_problem(service.call("POST", "/v1/volumes?volume_index=0", good_dicom_upload()), 400, "bad-query");
+  expect_problem(service.call("POST", "/v1/volumes?non_finite=0", good_dicom_upload()), 400, "bad-query");
+  expect_problem(service.call("POST", "/v1/volumes?series=1.2", good()), 400, "bad-query");
 }
 
 TEST(BadUploads, ABigClaimTakesNoMemory) {
