@@ -1,3 +1,5 @@
+#include <array>
+
 #include "service/http/answers.h"
 #include "service/http/handlers.h"
 #include "service/http/metrics.h"
@@ -6,6 +8,22 @@
 
 namespace volsmooth {
 namespace {
+
+const std::array<Engine::Format, 2> kNifti = {
+    {{"nifti-1", "application/gzip", "NIfTI-1 in one file (.nii or .nii.gz), either byte order."},
+     {"nifti-2", "application/gzip", "NIfTI-2 in one file (.nii or .nii.gz), either byte order."}}};
+const Engine::Format kDicomInput = {
+    "dicom", "application/dicom",
+    "A series as a zip or as a multipart/related body of its files, or one multi-frame file."};
+const std::array<Engine::Format, 4> kDicomOutputs = {
+    {{"dicom-series", "application/zip",
+      "A derived series in the study of a DICOM input, as a zip of its files."},
+     {"dicom-stl", "application/dicom",
+      "Encapsulated STL in the study of a DICOM input, one for each isovalue."},
+     {"dicom-obj", "application/dicom",
+      "Encapsulated OBJ in the study of a DICOM input, one for each isovalue."},
+     {"dicom-surface-segmentation", "application/dicom",
+      "Surface Segmentation in the study of a DICOM input, a segment for each isovalue."}}};
 
 nlohmann::json as_document(const Engine::Format& format) {
   return {{"name", format.name}, {"media_type", format.media_type}, {"description", format.description}};
@@ -22,11 +40,14 @@ Reply get_methods(Api& api, Request&) {
 Reply get_formats(Api& api, Request&) {
   auto meshes = nlohmann::json::array();
   for (const auto& format : api.jobs.engine().mesh_formats) meshes.push_back(as_document(format));
-  const nlohmann::json nifti = {as_document({"nifti-1", "application/gzip",
-                                             "NIfTI-1 in one file (.nii or .nii.gz), either byte order."}),
-                                as_document({"nifti-2", "application/gzip",
-                                             "NIfTI-2 in one file (.nii or .nii.gz), either byte order."})};
-  return json_response({{"inputs", nifti}, {"outputs", nifti}, {"meshes", meshes}});
+  auto inputs = nlohmann::json::array(), outputs = nlohmann::json::array();
+  for (const Engine::Format& format : kNifti) {
+    inputs.push_back(as_document(format));
+    outputs.push_back(as_document(format));
+  }
+  inputs.push_back(as_document(kDicomInput));
+  for (const Engine::Format& format : kDicomOutputs) outputs.push_back(as_document(format));
+  return json_response({{"inputs", inputs}, {"outputs", outputs}, {"meshes", meshes}});
 }
 
 Reply get_healthz(Api&, Request&) {
