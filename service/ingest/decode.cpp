@@ -15,21 +15,12 @@ namespace {
   throw std::system_error(errno, std::generic_category(), what);
 }
 
-/// The output as memory.
-std::span<float> map_output(std::int64_t voxels) {
-  const auto bytes = static_cast<std::size_t>(voxels) * sizeof(float);
-  if (::ftruncate(kOutputDescriptor, static_cast<off_t>(bytes)) != 0) fail("making room for the voxels");
-  void* mapped = ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_SHARED, kOutputDescriptor, 0);
-  if (mapped == MAP_FAILED) fail("mapping the voxels");
-  return {static_cast<float*>(mapped), static_cast<std::size_t>(voxels)};
-}
-
 void append(const void* bytes, std::size_t count) {
   const char* next = static_cast<const char*>(bytes);
   while (count > 0) {
     const ssize_t written = ::write(kOutputDescriptor, next, count);
     if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) fail("writing the padding");
+    if (written <= 0) fail("writing the output");
     next += written;
     count -= static_cast<std::size_t>(written);
   }
@@ -46,11 +37,16 @@ struct Padding {
   }
 };
 
-void fill(std::span<float> voxels, const Padding& padding, float intensity) {
+/// Puts `intensity` into the padded ones of the voxels that were written.
+void fill(const Padding& padding, std::size_t voxels, float intensity) {
+  void* mapped =
+      ::mmap(nullptr, voxels * sizeof(float), PROT_READ | PROT_WRITE, MAP_SHARED, kOutputDescriptor, 0);
+  if (mapped == MAP_FAILED) fail("mapping the voxels");
+  float* const written = static_cast<float*>(mapped);
   for (std::size_t byte = 0; byte < padding.bits.size(); ++byte) {
     if (padding.bits[byte] == 0) continue;
     for (std::size_t bit = 0; bit < 8; ++bit)
-      if ((padding.bits[byte] >> bit & 1) != 0) voxels[8 * byte + bit] = intensity;
+      if ((padding.bits[byte] >> bit & 1) != 0) written[8 * byte + bit] = intensity;
   }
 }
 
@@ -59,20 +55,19 @@ void fill(std::span<float> voxels, const Padding& padding, float intensity) {
 nlohmann::json answer_decode(const IngestCall& call) {
   const auto series = read_series(call.upload, call.series);
   if (!series) return answer_of(series.error());
-  const std::span<float> voxels = map_output(voxel_count(series->size));
-  Padding padding{std::vector<std::uint8_t>((voxels.size() + 7) / 8), {}};
+  const auto voxels = static_cast<std::size_t>(voxel_count(series->size));
+  Padding padding{std::vector<std::uint8_t>((voxels + 7) / 8), {}};
   const auto take = [&](std::int64_t slice, std::span<const float> intensities,
                         std::span<const std::uint8_t> padded) {
+    append(intensities.data(), intensities.size_bytes());
     const std::size_t first = static_cast<std::size_t>(slice) * intensities.size();
-    std::ranges::copy(intensities, voxels.begin() + static_cast<std::ptrdiff_t>(first));
     for (std::size_t i = 0; i < padded.size(); ++i)
       if (padded[i] != 0) padding.mark(first + i, intensities[i]);
   };
   const auto facts = decode_series(*series, take);
   if (!facts) return answer_of(facts.error());
   if (facts->padded_voxels > 0) {
-    fill(voxels, padding, static_cast<float>(facts->intensity_min));
-    if (::lseek(kOutputDescriptor, 0, SEEK_END) < 0) fail("finding the end of the voxels");
+    fill(padding, voxels, static_cast<float>(facts->intensity_min));
     append(padding.bits.data(), padding.bits.size());
     append(padding.intensities.data(), padding.intensities.size() * sizeof(float));
   }

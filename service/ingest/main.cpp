@@ -14,6 +14,7 @@
 
 namespace {
 
+constexpr int kKeptBytes = 64 << 20;
 constexpr int kUsageError = 2, kNoSandbox = 70, kGivenUp = 1;
 
 void write_answer(const nlohmann::json& answer) {
@@ -42,6 +43,8 @@ volsmooth::SandboxLimits limits_of(const nlohmann::json& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  ::mallopt(M_MMAP_THRESHOLD, kKeptBytes);  // slices come and go: their pages need not
+  ::mallopt(M_TRIM_THRESHOLD, kKeptBytes);
   const auto commands = volsmooth::ingest_commands();
   const auto command =
       argc == 2 ? std::ranges::find(commands, argv[1], &volsmooth::IngestCommand::name) : commands.end();

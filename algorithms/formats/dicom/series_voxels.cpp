@@ -31,7 +31,7 @@ bool scaled_alike(const DicomSeries& series) {
 /// A slice as it is stored, in intensities.
 struct Plane {
   std::vector<float> intensities;
-  std::vector<std::uint8_t> is_padding;
+  std::vector<std::uint8_t> is_padding;  ///< empty: there is none
 };
 
 class Decoder {
@@ -80,20 +80,32 @@ class Decoder {
     const auto file = series_.files->bytes(slice.file);
     if (!file) throw Refused{file.error()};
     const std::vector<std::int32_t> stored = stored_values(*file, slice, series_.format);
-    Plane made{std::vector<float>(stored.size()), std::vector<std::uint8_t>(stored.size())};
-    const double half_step = std::abs(slice.rescale_slope) / 2;
-    for (std::size_t i = 0; i < stored.size(); ++i) {
-      const double exact = stored[i] * slice.rescale_slope + slice.rescale_intercept;
-      made.intensities[i] = static_cast<float>(exact);
-      counts_.inexact += std::abs(static_cast<double>(made.intensities[i]) - exact) > half_step;
-    }
+    Plane made{std::vector<float>(stored.size()), {}};
+    const double slope = slice.rescale_slope, intercept = slice.rescale_intercept;
+    for (std::size_t i = 0; i < stored.size(); ++i)
+      made.intensities[i] = static_cast<float>(stored[i] * slope + intercept);
+    count_inexact(slice, stored, made.intensities);
     if (slice.padding) {
       const auto [lowest, highest] = *slice.padding;
+      made.is_padding.resize(stored.size());
       std::ranges::transform(stored, made.is_padding.begin(), [&](std::int32_t value) {
         return static_cast<std::uint8_t>(value >= lowest && value <= highest);
       });
+      if (std::ranges::count(made.is_padding, 0) == std::ssize(stored)) made.is_padding.clear();
     }
     return made;
+  }
+
+  /// float holds every value to half a step while intensities are below 2^23 steps.
+  void count_inexact(const DicomSlice& slice, const std::vector<std::int32_t>& stored,
+                     const std::vector<float>& intensities) {
+    const double step = std::abs(slice.rescale_slope);
+    const double largest = std::ldexp(step, series_.format.bits_stored) + std::abs(slice.rescale_intercept);
+    if (largest <= std::ldexp(step, 23)) return;
+    for (std::size_t i = 0; i < stored.size(); ++i) {
+      const double exact = stored[i] * slice.rescale_slope + slice.rescale_intercept;
+      counts_.inexact += std::abs(static_cast<double>(intensities[i]) - exact) > step / 2;
+    }
   }
 
   const Plane& kept(std::size_t which) {
@@ -106,27 +118,41 @@ class Decoder {
 
   Plane blended(const Blend& blend) {
     if (blend.weight == 0) return kept(blend.lower);
-    Plane made = kept(blend.lower);
+    const Plane lower = kept(blend.lower);
     const Plane& upper = kept(blend.upper);
+    Plane made = lower;
+    if (!lower.is_padding.empty() || !upper.is_padding.empty())
+      made.is_padding.resize(made.intensities.size());
     for (std::size_t i = 0; i < made.intensities.size(); ++i) {
-      if (made.is_padding[i] != 0) continue;
-      const double lower = made.intensities[i];
-      const bool padded = upper.is_padding[i] != 0;
-      const double mixed = lower + blend.weight * (upper.intensities[i] - lower);
-      made.intensities[i] = padded ? upper.intensities[i] : static_cast<float>(mixed);
-      made.is_padding[i] = static_cast<std::uint8_t>(padded);
+      if (is_padding(lower, i)) continue;
+      const double from = lower.intensities[i], to = upper.intensities[i];
+      const bool padded = is_padding(upper, i);
+      made.intensities[i] =
+          padded ? upper.intensities[i] : static_cast<float>(from + blend.weight * (to - from));
+      if (padded) made.is_padding[i] = 1;
     }
     return made;
   }
 
+  static bool is_padding(const Plane& plane, std::size_t pixel) {
+    return !plane.is_padding.empty() && plane.is_padding[pixel] != 0;
+  }
+
   void pass_on(std::size_t which, const Plane& plane) {
+    if (plane.is_padding.empty()) {
+      statistics_.add(plane.intensities);
+    } else {
+      add_valid(plane);
+    }
+    take_(static_cast<std::int64_t>(which), plane.intensities, plane.is_padding);
+  }
+
+  void add_valid(const Plane& plane) {
     std::vector<float> valid;
-    valid.reserve(plane.intensities.size());
     for (std::size_t i = 0; i < plane.intensities.size(); ++i)
-      if (plane.is_padding[i] == 0) valid.push_back(plane.intensities[i]);
+      if (!is_padding(plane, i)) valid.push_back(plane.intensities[i]);
     padded_ += std::ssize(plane.intensities) - std::ssize(valid);
     statistics_.add(valid);
-    take_(static_cast<std::int64_t>(which), plane.intensities, plane.is_padding);
   }
 
   static constexpr std::size_t kNone = static_cast<std::size_t>(-1);

@@ -23,8 +23,8 @@ struct SeriesVoxels {
   std::vector<std::string> warnings;
 };
 
-/// Takes the intensities of one slice of the volume; where `is_padding` is not 0, they are those of the
-/// padding.
+/// Takes the intensities of one slice of the volume, slice by slice; where `is_padding` is not 0, they are
+/// those of the padding. It is empty for a slice without.
 using TakeSlice = std::function<void(std::int64_t slice, std::span<const float> intensities,
                                      std::span<const std::uint8_t> is_padding)>;
 

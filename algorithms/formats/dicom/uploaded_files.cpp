@@ -18,6 +18,7 @@ namespace {
 using namespace std::string_view_literals;
 
 constexpr std::int64_t kFreeInflatedBytes = std::int64_t{32} << 20;  // of one file, whatever the ratio
+constexpr std::size_t kMostKeptBytes = std::size_t{256} << 20;
 constexpr std::size_t kInflatedAtOnce = std::size_t{1} << 20;
 
 std::span<const std::byte> bytes_of(std::string_view text) {
@@ -81,41 +82,55 @@ tl::expected<UploadedFiles, Refusal> UploadedFiles::in(std::span<const std::byte
   UploadedFiles files;
   files.limits_ = limits;
   if (is_part10(upload)) {
-    files.entries_.push_back({upload, {}});
+    files.entries_.push_back({.stored = upload});
   } else if (looks_like_zip(upload)) {
     auto directory = read_zip_directory(upload, zip_limits(limits));
     if (!directory) return tl::unexpected(directory.error());
-    for (ZipEntry& entry : *directory) files.entries_.push_back({upload, std::move(entry)});
+    for (ZipEntry& entry : *directory)
+      files.entries_.push_back({.stored = upload, .packed = std::move(entry)});
   } else {
     const auto parts = multipart_parts(upload);
     if (!parts) return tl::unexpected(parts.error());
-    for (const auto part : *parts) files.entries_.push_back({part, {}});
+    for (const auto part : *parts) files.entries_.push_back({.stored = part});
   }
   return files;
 }
 
 tl::expected<std::span<const std::byte>, Refusal> UploadedFiles::bytes(std::size_t which) {
-  if (open_ == which) return opened_;
-  open_.reset();
-  unpacked_ = {};
-  const Entry& entry = entries_.at(which);
-  opened_ = entry.stored;
+  Entry& entry = entries_.at(which);
+  if (!entry.opened.empty()) return entry.opened;
+  std::vector<std::byte> unpacked;
+  std::span<const std::byte> file = entry.stored;
   if (entry.packed) {
-    auto unpacked = unpack(entry.stored, *entry.packed);
-    if (!unpacked) return tl::unexpected(unpacked.error());
-    unpacked_ = *std::move(unpacked);
-    opened_ = unpacked_;
+    auto content = unpack(entry.stored, *entry.packed);
+    if (!content) return tl::unexpected(content.error());
+    unpacked = *std::move(content);
+    file = unpacked;
   }
-  if (is_part10(opened_)) {
-    auto plain = or_refusal([&] { return inflated_if_deflated(opened_, limits_); });
+  if (is_part10(file)) {
+    auto plain = or_refusal([&] { return inflated_if_deflated(file, limits_); });
     if (!plain) return tl::unexpected(plain.error());
     if (!plain->empty()) {
-      unpacked_ = *std::move(plain);
-      opened_ = unpacked_;
+      unpacked = *std::move(plain);
+      file = unpacked;
     }
   }
-  open_ = which;
-  return opened_;
+  if (!unpacked.empty()) keep(which, std::move(unpacked));
+  entry.opened = file;
+  return file;
+}
+
+/// Makes room for it by giving up all others.
+void UploadedFiles::keep(std::size_t which, std::vector<std::byte> unpacked) {
+  if (kept_bytes_ + unpacked.size() > kMostKeptBytes) {
+    for (Entry& entry : entries_) {
+      if (!entry.unpacked.empty()) entry.opened = {};
+      entry.unpacked = {};
+    }
+    kept_bytes_ = 0;
+  }
+  kept_bytes_ += unpacked.size();
+  entries_[which].unpacked = std::move(unpacked);
 }
 
 }  // namespace volsmooth

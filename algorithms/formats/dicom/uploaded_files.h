@@ -14,7 +14,7 @@
 
 namespace volsmooth {
 
-/// The files in an upload, unpacked one at a time: memory holds the largest, not their sum.
+/// The files in an upload. Unpacked ones are kept while they are less than 256 MiB together, or alone.
 class UploadedFiles {
  public:
   /// `upload` must outlive the object. Refusals: those of `read_zip_directory`, `multipart-corrupt`.
@@ -29,15 +29,17 @@ class UploadedFiles {
 
  private:
   struct Entry {
-    std::span<const std::byte> stored;
-    std::optional<ZipEntry> packed;  ///< in `stored`, which is the zip then
+    std::span<const std::byte> stored = {};
+    std::optional<ZipEntry> packed = {};     ///< in `stored`, which is the zip then
+    std::vector<std::byte> unpacked = {};    ///< while it is kept
+    std::span<const std::byte> opened = {};  ///< empty: not yet, or not kept
   };
+
+  void keep(std::size_t which, std::vector<std::byte> unpacked);
 
   std::vector<Entry> entries_;
   ReadLimits limits_;
-  std::optional<std::size_t> open_;  ///< which of them `opened_` is
-  std::vector<std::byte> unpacked_;
-  std::span<const std::byte> opened_;
+  std::size_t kept_bytes_ = 0;
 };
 
 }  // namespace volsmooth

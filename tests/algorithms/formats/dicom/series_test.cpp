@@ -45,6 +45,7 @@ Read read(std::string upload, const SeriesOptions& options = {}) {
     EXPECT_EQ(slice * std::ssize(intensities), std::ssize(result.voxels));
     result.voxels.insert(result.voxels.end(), intensities.begin(), intensities.end());
     result.is_padding.insert(result.is_padding.end(), padded.begin(), padded.end());
+    result.is_padding.resize(result.voxels.size());
   };
   auto facts = decode_series(result.series, take);
   if (!facts) throw std::runtime_error(facts.error().slug);
