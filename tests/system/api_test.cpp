@@ -278,7 +278,8 @@ TEST_F(Api, TheCatalogueIsWhatOrdersAreHeldTo) {
   }
   EXPECT_THAT(names, testing::IsSupersetOf({"mean-curvature-flow", "conservative-mean-curvature-flow",
                                             "laplacian", "compare", "offset", "sharpening"}));
-  EXPECT_THAT(service_.get("/v1/formats").dump(), testing::AllOf(HasSubstr("stl"), HasSubstr("glb"), HasSubstr("dicom-series")));
+  EXPECT_THAT(service_.get("/v1/formats").dump(),
+              testing::AllOf(HasSubstr("stl"), HasSubstr("glb"), HasSubstr("dicom-series")));
 }
 
 TEST_F(Api, MetricsAndHealth) {
