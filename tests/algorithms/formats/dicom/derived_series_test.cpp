@@ -6,6 +6,8 @@
 #include <cmath>
 #include <set>
 
+#include "algorithms/formats/dicom/derived_attributes.h"
+#include "algorithms/formats/dicom/uploaded_files.h"
 #include "tests/support/dicom_results.h"
 
 namespace volsmooth {
@@ -182,9 +184,41 @@ TEST(DerivedSeries, LeavesOutWhatNoLongerHoldsAndWhatIsPrivate) {
   }
 }
 
+TEST(DerivedSeries, HasNoWindowOfNoWidth) {
+  auto series = test::series_of({});
+  for (DicomDataset& set : series) {
+    set.text(0x00281050, "DS", "40\\0");
+    set.text(0x00281051, "DS", "400\\0");
+  }
+  const SeriesInMemory source = read(series);
+  const auto set = test::derive(source, source.voxels).attributes(0);
+  EXPECT_FALSE(has(set, 0x00281050));
+  EXPECT_FALSE(has(set, 0x00281051));
+}
+
+TEST(DerivedSeries, SaysThatItsSourceWasCompressedWithLoss) {
+  const SeriesInMemory source = read(test::series_of({}));
+  DicomSlice slice = source.series.slices[0];
+  slice.transfer_syntax_uid = "1.2.840.10008.1.2.4.91";
+  slice.pixels = {{0, 40}, {40, 24}};  // of 16 x 16 x 2 bytes
+  const auto bytes = source.series.files->bytes(slice.file).value();
+  const auto set =
+      derived_attributes(public_attributes(bytes), source.series, slice, test::some_derivation(), "1.2");
+  EXPECT_EQ(text_of(set, 0x00282110), "01");
+  EXPECT_EQ(text_of(set, 0x00282112), "8");
+  EXPECT_EQ(text_of(set, 0x00282114), "ISO_15444_1");
+}
+
 TEST(DerivedSeries, OfAMultiFrameObjectIsOne) {
-  const std::string file = test::dicom_file(test::enhanced_of(tilted()));
-  const SeriesInMemory source = test::read_into_memory(file);
+  DicomDataset object = test::enhanced_of(tilted());
+  DicomDataset type, earlier;
+  type.text(0x00089007, "CS", "ORIGINAL\\PRIMARY\\AXIAL\\NONE");
+  earlier.text(0x00082111, "ST", "an earlier derivation");
+  for (DicomDataset& frame : object.at(0x52009230).items) {
+    frame.sequence(0x00189329, {type});
+    frame.sequence(0x00089124, {earlier});
+  }
+  const SeriesInMemory source = test::read_into_memory(test::dicom_file(object));
   const auto derived = test::derive(source, plus(source.voxels, 3));
   EXPECT_EQ(derived.files.size(), 1u);
   EXPECT_EQ(derived.again.voxels, plus(source.voxels, 3));
@@ -194,6 +228,10 @@ TEST(DerivedSeries, OfAMultiFrameObjectIsOne) {
   const auto derivation = items_of(items_of(set, 0x52009229).at(0), 0x00089124).at(0);
   EXPECT_EQ(text_of(items_of(derivation, 0x00082112).at(0), 0x00081155),
             source.series.slices[0].sop_instance_uid);
+  for (const auto& frame : items_of(set, 0x52009230)) {
+    EXPECT_EQ(text_of(items_of(frame, 0x00189329).at(0), 0x00089007), "DERIVED\\PRIMARY\\AXIAL\\NONE");
+    EXPECT_FALSE(has(frame, 0x00089124));
+  }
 }
 
 TEST(DerivedSeries, OfAResampledSeriesIsInterpolatedAtEachSlice) {
