@@ -78,25 +78,40 @@ inline Derived derive(const SeriesInMemory& source, std::span<const float> inten
   return derived;
 }
 
-/// What dciodvfy, which knows the IODs of the standard, calls an error in an object.
-inline std::vector<std::string> errors_of_dciodvfy(std::string_view object) {
+/// What a program prints of a DICOM file.
+inline std::vector<std::string> said_by(const std::string& program, std::string_view object) {
   const TemporaryDirectory folder;
   std::ofstream(folder / "object.dcm", std::ios::binary)
       .write(object.data(), static_cast<std::streamsize>(object.size()));
-  ChildProcess({"/usr/bin/dciodvfy", folder / "object.dcm"}, folder / "said", folder / "said").wait();
+  ChildProcess({program, folder / "object.dcm"}, folder / "said", folder / "said").wait();
   std::ifstream said(folder / "said");
-  std::vector<std::string> errors;
-  bool knows = false;
-  for (std::string line; std::getline(said, line);) {
-    if (line.find("Error") != std::string::npos) errors.push_back(line);
-    knows = knows || line.find("Error") == std::string::npos;
-  }
-  if (!knows) errors.emplace_back("it named no IOD");
-  return errors;
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(said, line);) lines.push_back(line);
+  return lines;
 }
 
-inline bool has_dciodvfy() {
-  return std::filesystem::exists("/usr/bin/dciodvfy");
+inline bool installed(const std::string& program) {
+  return std::filesystem::exists(program);
+}
+
+/// What dciodvfy, which knows the IODs of the standard, calls an error in an object, and what DCMTK complains
+/// of; each where it is installed.
+inline std::vector<std::string> errors_of_other_readers(std::string_view object) {
+  const std::string dciodvfy = "/usr/bin/dciodvfy", dcmdump = "/usr/bin/dcmdump";
+  std::vector<std::string> errors;
+  if (installed(dciodvfy)) {
+    bool named = false;  // the IOD
+    for (const std::string& line : said_by(dciodvfy, object)) {
+      if (line.starts_with("Error")) errors.push_back(line);
+      named = named || line.find(' ') == std::string::npos;
+    }
+    if (!named) errors.emplace_back("dciodvfy names no IOD");
+  }
+  if (installed(dcmdump)) {
+    for (const std::string& line : said_by(dcmdump, object))
+      if (line.starts_with("E:") || line.starts_with("W:")) errors.push_back(line);
+  }
+  return errors;
 }
 
 }  // namespace volsmooth::test

@@ -14,6 +14,7 @@
 #include "algorithms/formats/dicom/series_voxels.h"
 #include "algorithms/formats/dicom/uploaded_files.h"
 #include "tests/support/dicom_maker.h"
+#include "tests/support/dicom_results.h"
 
 namespace volsmooth {
 namespace {
@@ -123,6 +124,20 @@ TEST_F(RealDicom, RowSpacingIsNotColumnSpacing) {
   EXPECT_EQ(series->size, (Size3{256, 128, 4}));
   EXPECT_NEAR(series->spacing_mm[0], 0.1, 1e-9);
   EXPECT_NEAR(series->spacing_mm[1], 0.2, 1e-9);
+}
+
+TEST_F(RealDicom, DerivedSeriesKeepEverySliceAndValue) {
+  for (const char* series :
+       {"dicom_ct_series_skull_phantom", "dicom_ct_3slices", "dicom_mr_series_oblique"}) {
+    const test::SeriesInMemory source = test::read_into_memory(body_of(series));
+    const auto derived = test::derive(source, source.voxels);
+    EXPECT_EQ(derived.again.voxels, source.voxels) << series;
+    EXPECT_EQ(derived.again.facts.padded_voxels, source.facts.padded_voxels) << series;
+    for (std::size_t k = 0; k < source.series.slices.size(); ++k)
+      EXPECT_EQ(derived.again.series.slices[k].position_mm, source.series.slices[k].position_mm) << series;
+    for (const std::string& error : test::errors_of_other_readers(derived.files[0]))
+      EXPECT_THAT(error, testing::StartsWith("Error - Illegal root for UID")) << series;
+  }
 }
 
 }  // namespace
