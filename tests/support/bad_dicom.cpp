@@ -120,6 +120,13 @@ std::string bad_run_lengths() {
   return header;
 }
 
+/// Runs of 128 zeros where a segment has 30 cells.
+std::string run_over_the_end() {
+  std::string frame = little(2U) + little(64U) + little(66U);
+  frame.resize(64);
+  return frame + std::string("\x81\0\x81\0", 4);
+}
+
 std::string jpeg_claiming(std::uint16_t edge) {
   const std::string size{static_cast<char>(edge >> 8), static_cast<char>(edge & 0xff)};
   return std::string("\xff\xd8\xff\xc3\x00\x0b\x10", 7) + size + size +
@@ -176,6 +183,9 @@ std::vector<DicomUpload> structure_rows() {
        "dicom-truncated"},
       {"D2PreambleOnly", [] { return std::string(128, '\0') + "DICM"; }, 422, "dicom-missing-attribute"},
       {"D3HugePrivateLength", tail(raw_element(0x00091010, "OB", 0xf0000000, "xx")), 422, "dicom-bad-length"},
+      {"ItemLongerThanItsSequence",
+       tail(raw_element(0x00081140, "SQ", 8, tag_bytes(0xfffee000) + little(100'000U))), 422,
+       "dicom-bad-length"},
       {"D4HugePixelDataLength",
        [] {
          Datasets series = series_of(kSmall);
@@ -221,6 +231,8 @@ std::vector<DicomUpload> structure_rows() {
       {"D15BigEndian", [] { return multipart_of(files_of(series_of(kSmall), transfer_syntax::kBigEndian)); },
        201},
       {"D16RunLengths", encapsulated(transfer_syntax::kRle, bad_run_lengths()), 422, "dicom-decode-failed"},
+      {"D16RunOverTheEnd", encapsulated(transfer_syntax::kRle, run_over_the_end()), 422,
+       "dicom-decode-failed"},
       {"D16JpegClaim", encapsulated(transfer_syntax::kJpegLossless, jpeg_claiming(65535)), 422,
        "dicom-decode-failed"},
       {"D16JpegWithoutScan", encapsulated(transfer_syntax::kJpegLossless, jpeg_claiming(6)), 422,
