@@ -120,10 +120,12 @@ Json ingest_options(const UploadOptions& options, const PipelineLimits& limits, 
   // The upload is mapped; what is unpacked of it is held file by file, while it grows in two copies.
   const std::int64_t unpacked = std::min(400 * upload_bytes + 256 * kMiB, 4 * limits.max_voxels + 64 * kMiB);
   const std::int64_t written = 9 * voxels;
+  std::int64_t held = 3 * unpacked + 2 * written;
+  if (limits.max_memory_bytes > 0) held = std::min(held, limits.max_memory_bytes);
   return {{"series", options.series},
           {"resample", options.resample},
           {"max_voxels", limits.max_voxels},
-          {"address_space_bytes", 1024 * kMiB + upload_bytes + 3 * unpacked + 2 * written},
+          {"address_space_bytes", 1024 * kMiB + upload_bytes + held},
           {"output_bytes", written + 64 * kMiB},
           {"cpu_seconds", 60 + upload_bytes / kMiB}};
 }

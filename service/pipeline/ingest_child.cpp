@@ -91,9 +91,13 @@ class Child {
     ::waitpid(process_, nullptr, 0);
   }
 
+  /// Waits for it a while. A sandbox around us may have no pidfd: then the whole while.
   bool has_ended() const {
     pollfd polled{descriptor_.get(), POLLIN, 0};
-    return ::poll(&polled, 1, static_cast<int>(kPause.count())) > 0;
+    ::poll(&polled, 1, static_cast<int>(kPause.count()));
+    siginfo_t ended{};
+    ::waitid(P_PID, static_cast<id_t>(process_), &ended, WEXITED | WNOHANG | WNOWAIT);
+    return ended.si_pid == process_;
   }
 
   /// Its exit code; -1 after a signal.
