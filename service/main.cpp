@@ -12,11 +12,14 @@
 #include <optional>
 #include <stdexcept>
 
+#include "service/configuration.h"
 #include "service/http/log.h"
 #include "service/http/metrics.h"
 #include "service/http/server.h"
 #include "service/jobs/job_service.h"
 #include "service/jobs/machine.h"
+#include "service/pacs/pacs.h"
+#include "service/pacs/presets.h"
 #include "service/pipeline/pipeline.h"
 
 namespace volsmooth {
@@ -30,11 +33,16 @@ struct Options {
   std::filesystem::path ingest_program;
   std::string log_level = "info";
   bool ephemeral = false;
+  // Of the configuration file.
+  std::vector<Node> nodes;
+  std::vector<Preset> presets;
 };
 
 void declare(CLI::App& app, Options& options) {
   app.set_version_flag("--version", "volsmoothd " VOLSMOOTH_VERSION);
-  app.set_config("--config", "", "Reads options from this file (TOML or INI)")->envname("VOLSMOOTH_CONFIG");
+  app.set_config("--config", "", "Reads options and DICOM nodes from this file (JSON)")
+      ->envname("VOLSMOOTH_CONFIG");
+  app.allow_config_extras(CLI::config_extras_mode::error);
   app.add_option("--listen", options.server.listen, "ADDRESS:PORT (port 0: any free one) or unix:PATH")
       ->envname("VOLSMOOTH_LISTEN")
       ->capture_default_str();
@@ -118,8 +126,10 @@ void serve(const Options& options) {
   if (options.ephemeral) folder.emplace(options.jobs.data_dir);
 
   Metrics metrics;
-  JobService jobs(options.jobs, make_engine({.max_memory_bytes = options.jobs.memory_limit_bytes,
-                                             .ingest_program = options.ingest_program}));
+  JobService jobs(options.jobs,
+                  make_engine({.max_memory_bytes = options.jobs.memory_limit_bytes,
+                               .ingest_program = options.ingest_program}),
+                  make_pacs(options.nodes, options.presets, options.jobs.max_upload_bytes));
   jobs.on_final([&metrics](const Job& job) {
     metrics.job_done(job);
     log_job(job);
@@ -147,10 +157,17 @@ int run(int argc, char** argv) {
   Options options;
   CLI::App app("Smooths medical volumes; an HTTP service. GET /openapi.json describes it.", "volsmoothd");
   declare(app, options);
+  const auto configuration = std::make_shared<JsonConfiguration>();
+  app.config_formatter(configuration);
   try {
     app.parse(argc, argv);
+    options.nodes = nodes_from(configuration->nodes());
+    options.presets = presets_from(configuration->presets());
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kUsageError;
+  } catch (const std::runtime_error& error) {
+    std::cerr << "volsmoothd: " << error.what() << '\n';
+    return kUsageError;
   }
   options.server.max_upload_bytes = options.jobs.max_upload_bytes;
   // The memory is said once, for the single job as for all that run together.

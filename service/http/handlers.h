@@ -27,6 +27,10 @@ Reply cancel_job(Api& api, Request& request);
 Reply delete_job(Api& api, Request& request);
 Reply get_results(Api& api, Request& request);
 Reply get_result(Api& api, Request& request);
+Reply get_delivery(Api& api, Request& request);
+Reply deliver_again(Api& api, Request& request);
+
+Reply post_studies(Api& api, Request& request);
 
 Reply get_methods(Api& api, Request& request);
 Reply get_formats(Api& api, Request& request);

@@ -15,6 +15,8 @@ constexpr double kDefaultPage = 50;
 nlohmann::json document_of(const Job& job) {
   auto document = to_json(job);
   if (job.error) document["error"] = problem_document(*job.error);
+  if (job.delivery && job.delivery->error)
+    document["delivery"]["error"] = problem_document(*job.delivery->error);
   return document;
 }
 
@@ -174,6 +176,20 @@ Reply get_results(Api& api, Request& request) {
 Reply get_result(Api& api, Request& request) {
   return api.jobs.result(request.path["id"], request.path["name"]).and_then([&](const StoredFile& file) {
     return reply_with_file(request, file);
+  });
+}
+
+Reply get_delivery(Api& api, Request& request) {
+  return api.jobs.ledger(request.path["id"]).map([](const std::vector<LedgerEntry>& ledger) {
+    auto documents = nlohmann::json::array();
+    for (const auto& entry : ledger) documents.push_back(to_json(entry));
+    return json_response({{"instances", documents}});
+  });
+}
+
+Reply deliver_again(Api& api, Request& request) {
+  return api.jobs.deliver_again(request.path["id"]).map([](const Job& job) {
+    return json_response(document_of(job), 202);
   });
 }
 

@@ -78,7 +78,36 @@ const json& fixed_schemas() {
         "started_at": {"type": ["string", "null"], "format": "date-time"},
         "finished_at": {"type": ["string", "null"], "format": "date-time"},
         "error": {"anyOf": [{"$ref": "#/components/schemas/Problem"}, {"type": "null"}]},
-        "results": {"type": "array", "items": {"$ref": "#/components/schemas/Result"}}}},
+        "next_attempt_at": {"description": "When a source that could not give the series is asked again.",
+                            "type": ["string", "null"], "format": "date-time"},
+        "results": {"type": "array", "items": {"$ref": "#/components/schemas/Result"}},
+        "delivery": {"anyOf": [{"$ref": "#/components/schemas/Delivery"}, {"type": "null"}]}}},
+    "Delivery": {
+      "description": "How far the DICOM outputs are on their way to the job's destination.",
+      "type": "object",
+      "required": ["destination", "state", "instances", "stored", "refused", "tries", "next_attempt_at", "error"],
+      "properties": {
+        "destination": {"type": "string"},
+        "state": {"enum": ["pending", "delivered", "failed"]},
+        "instances": {"type": "integer", "minimum": 0},
+        "stored": {"type": "integer", "minimum": 0},
+        "refused": {"type": "integer", "minimum": 0},
+        "tries": {"description": "Those that did not come to an end.", "type": "integer", "minimum": 0},
+        "next_attempt_at": {"type": ["string", "null"], "format": "date-time"},
+        "error": {"anyOf": [{"$ref": "#/components/schemas/Problem"}, {"type": "null"}]}}},
+    "Ledger": {
+      "type": "object",
+      "required": ["instances"],
+      "properties": {
+        "instances": {"type": "array", "items": {
+          "type": "object",
+          "required": ["sop_class_uid", "sop_instance_uid", "result", "state", "reason"],
+          "properties": {
+            "sop_class_uid": {"type": "string"},
+            "sop_instance_uid": {"type": "string"},
+            "result": {"type": "string"},
+            "state": {"enum": ["pending", "stored", "refused"]},
+            "reason": {"type": ["string", "null"]}}}}}},
     "JobPage": {
       "type": "object",
       "required": ["jobs", "next_cursor"],
@@ -131,10 +160,15 @@ json order_schema(const std::vector<MethodInfo>& methods) {
   for (const auto& method : methods) names.push_back(method.name);
   json order = json::parse(R"json({
     "type": "object",
-    "required": ["volume"],
+    "anyOf": [{"required": ["volume"]}, {"required": ["source"]}],
     "additionalProperties": false,
     "properties": {
       "volume": {"type": "string", "description": "The id of an uploaded volume."},
+      "source": {"type": "object", "description": "A series that is fetched from a node of the configuration.",
+                 "required": ["dicomweb", "study", "series"], "additionalProperties": false,
+                 "properties": {"dicomweb": {"type": "string", "description": "The node's name."},
+                                "study": {"type": "string"}, "series": {"type": "string"}}},
+      "destination": {"type": "string", "description": "The node of the configuration that gets the DICOM outputs."},
       "method": {"default": "mean-curvature-flow"},
       "parameters": {"$ref": "#/components/schemas/Parameters"},
       "isovalues": {"default": "auto", "anyOf": [{"const": "auto"}, {"type": "array", "items": {"type": "number"}}]},

@@ -5,9 +5,9 @@
 namespace volsmooth {
 namespace {
 
-constexpr std::array kCommands{IngestCommand{"inspect", answer_inspect},
-                               IngestCommand{"decode", answer_decode},
-                               IngestCommand{"derive", answer_derive}};
+constexpr std::array kCommands{
+    IngestCommand{"instances", answer_instances}, IngestCommand{"inspect", answer_inspect},
+    IngestCommand{"decode", answer_decode}, IngestCommand{"derive", answer_derive}};
 
 }  // namespace
 

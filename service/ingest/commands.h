@@ -15,6 +15,9 @@ struct IngestCommand {
 
 std::span<const IngestCommand> ingest_commands();
 
+/// What came to a preset: {"instances": [...]} with the UIDs and the place of each.
+nlohmann::json answer_instances(const IngestCall& call);
+
 /// Verifies the whole upload: {"volume": ...} or {"refusal": ...}.
 nlohmann::json answer_inspect(const IngestCall& call);
 

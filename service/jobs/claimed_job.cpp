@@ -37,18 +37,40 @@ void ClaimedJob::end_interrupted() {
   }
 }
 
+bool ClaimedJob::continue_with(Retrieved retrieved) {
+  JobChange change{job_.id, job_.attempt, JobState::kRunning, JobState::kQueued, {"queued", 0, std::nullopt}};
+  change.progress_events = running_->events_after({});
+  change.retrieved = std::move(retrieved);
+  return settle(std::move(change));
+}
+
+void ClaimedJob::wait_until(Time not_before, Problem why) {
+  JobChange change{
+      job_.id, job_.attempt, JobState::kRunning, JobState::kQueued, {"waiting-for-source", 0, std::nullopt}};
+  change.progress_events = running_->events_after({});
+  change.error = std::move(why);
+  change.not_before = not_before;
+  settle(std::move(change));
+}
+
 bool ClaimedJob::settle_as(JobState to, JobProgress progress, std::optional<Problem> error,
                            std::vector<Result> results) {
   progress.eta_seconds.reset();
-  JobChange change{job_.id,  job_.attempt,     JobState::kRunning, to,
-                   progress, std::move(error), std::move(results), running_->events_after({})};
+  return settle({job_.id, job_.attempt, JobState::kRunning, to, progress, std::move(error),
+                 std::move(results), running_->events_after({})});
+}
+
+bool ClaimedJob::settle(JobChange change) {
   const bool first = settle_(change);
-  if (!first && to != JobState::kCancelled) {
+  if (!first && change.to != JobState::kCancelled) {
     // A cancel came before; if the job is gone altogether, this changes nothing either.
     change.to = JobState::kCancelled;
     change.progress = running_->progress();
+    change.progress.eta_seconds.reset();
     change.error.reset();
     change.results.clear();
+    change.retrieved.reset();
+    change.not_before.reset();
     settle_(change);
   }
   settled_ = true;

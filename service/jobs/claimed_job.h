@@ -9,7 +9,7 @@
 
 namespace volsmooth {
 
-/// A job that is this thread's to run. Exactly one of `succeed`, `fail` and `end_interrupted` must be called;
+/// A job that is this thread's to run. Exactly one of the functions that end it must be called;
 /// a job that goes out of scope without is failed as `internal`.
 class ClaimedJob {
  public:
@@ -27,11 +27,15 @@ class ClaimedJob {
   bool succeed(
       std::vector<Result> results);  ///< false: the results must not be seen, the caller removes them
   void fail(Problem problem);
-  void end_interrupted();  ///< cancelled if somebody asked for that, else queued again
+  /// Queued again, now to compute on what was retrieved; false: it is not wanted any more.
+  bool continue_with(Retrieved retrieved);
+  void wait_until(Time not_before, Problem why);  ///< queued again, to ask its source then
+  void end_interrupted();                         ///< cancelled if somebody asked for that, else queued again
 
  private:
   bool settle_as(JobState to, JobProgress progress, std::optional<Problem> error,
                  std::vector<Result> results);
+  bool settle(JobChange change);
 
   const Job job_;
   RunningJobs& running_jobs_;

@@ -27,6 +27,12 @@ struct UploadOptions {
   std::string resample;  ///< "uniform": uneven DICOM slices are interpolated
 };
 
+/// A DICOM instance in an uploaded file.
+struct ArrivedInstance {
+  std::string sop_class_uid, sop_instance_uid, study_uid, series_uid;
+  std::int64_t offset = 0, bytes = 0;  ///< of its Part 10 file in the uploaded one
+};
+
 /// What verification found in an uploaded file: the volume document without what storing adds.
 struct VolumeFacts {
   std::string format;
@@ -50,9 +56,17 @@ struct StoredVolume {
   Time created_at;
 };
 
-/// What a client asks for; `volume` aside, every member has a default.
+/// A series that a job is to fetch from a node of the configuration before it can run, or one that devices
+/// have sent to a preset.
+struct DicomSource {
+  std::string node, study, series;  ///< a name; two UIDs
+  std::string preset = {};          ///< in place of a node
+};
+
+/// What a client asks for; all but `volume` (or `source`) has a default.
 struct JobOrder {
-  std::string volume;
+  std::string volume;                 ///< empty as long as the series is still at its source
+  std::optional<DicomSource> source;  ///< stays when the series is here
   std::string method = "mean-curvature-flow";
   ParameterValues parameters;                    ///< as asked; see Job::parameters for the resolved ones
   std::optional<std::vector<double>> isovalues;  ///< none: "auto"
@@ -60,6 +74,7 @@ struct JobOrder {
   std::string mesh_frame;           ///< "RAS", "LPS", or empty: the volume's own
   std::string voxel_type = "same";  ///< or "float32"
   std::vector<std::string> outputs = {"nifti"};
+  std::string destination;  ///< the node that gets the DICOM outputs; empty: none
   std::string label;
 };
 
@@ -93,9 +108,24 @@ bool is_final(JobState state);
 bool can_become(JobState from, JobState to);
 
 struct JobProgress {
-  std::string stage;  ///< "queued", "read", "flow", "surfaces", "write", "done"
+  std::string
+      stage;  ///< "queued", "waiting-for-source", "retrieve", "read", "flow", "surfaces", "write", "done"
   double fraction = 0;
   std::optional<double> eta_seconds;
+};
+
+enum class DeliveryState { kPending, kDelivered, kFailed };
+
+std::string_view name_of(DeliveryState state);
+
+/// How far the DICOM outputs of a succeeded job are on their way to its destination.
+struct Delivery {
+  std::string destination;
+  DeliveryState state = DeliveryState::kPending;
+  std::int64_t instances = 0, stored = 0, refused = 0;  ///< 0 instances until they are first looked at
+  int tries = 0;                                        ///< that ended without an answer for every instance
+  std::optional<Time> next_attempt_at;                  ///< after a try that failed
+  std::optional<Problem> error;                         ///< of the last try
 };
 
 struct Job {
@@ -108,8 +138,11 @@ struct Job {
   Time created_at;
   std::optional<Time> started_at;
   std::optional<Time> finished_at;
-  std::optional<Problem> error;
+  std::optional<Problem> error;         ///< why it failed, or why it waits for its source
+  std::optional<Time> next_attempt_at;  ///< of a job that waits for its source
+  int source_tries = 0;                 ///< how often its source could not give the series
   std::vector<Result> results;
+  std::optional<Delivery> delivery;
   int attempt = 0;  ///< how often it was claimed: the fence that a result must carry
 };
 
@@ -139,6 +172,9 @@ struct Engine {
   std::function<tl::expected<VolumeFacts, Problem>(const std::filesystem::path& file,
                                                    const UploadOptions& options, const Progress& report)>
       inspect;
+  /// The instances in a file that a device sent, before they are a series.
+  std::function<tl::expected<std::vector<ArrivedInstance>, Problem>(const std::filesystem::path& file)>
+      instances;
   /// Checks an order against its volume and resolves its parameters; cheap.
   std::function<tl::expected<JobPlan, Problem>(const JobOrder& order, const VolumeFacts& volume)> plan;
   /// Runs it. Result files are complete but not yet synced when it returns.

@@ -79,6 +79,25 @@ json to_json(const StoredVolume& volume) {
   return document;
 }
 
+json to_json(const Delivery& delivery) {
+  return {{"destination", delivery.destination},
+          {"state", name_of(delivery.state)},
+          {"instances", delivery.instances},
+          {"stored", delivery.stored},
+          {"refused", delivery.refused},
+          {"tries", delivery.tries},
+          {"next_attempt_at", or_null(delivery.next_attempt_at)},
+          {"error", delivery.error ? to_json(*delivery.error) : json(nullptr)}};
+}
+
+json to_json(const LedgerEntry& entry) {
+  return {{"sop_class_uid", entry.instance.sop_class_uid},
+          {"sop_instance_uid", entry.instance.sop_instance_uid},
+          {"result", entry.instance.result},
+          {"state", entry.state},
+          {"reason", or_null(entry.reason)}};
+}
+
 json to_json(const Job& job) {
   return {{"id", job.id},
           {"state", name_of(job.state)},
@@ -91,7 +110,9 @@ json to_json(const Job& job) {
           {"started_at", or_null(job.started_at)},
           {"finished_at", or_null(job.finished_at)},
           {"error", job.error ? to_json(*job.error) : json(nullptr)},
-          {"results", list_of(job.results)}};
+          {"next_attempt_at", or_null(job.next_attempt_at)},
+          {"results", list_of(job.results)},
+          {"delivery", job.delivery ? to_json(*job.delivery) : json(nullptr)}};
 }
 
 json to_json(const Result& result) {
@@ -106,14 +127,23 @@ json to_json(const Result& result) {
 }
 
 json to_json(const JobOrder& order) {
-  json document = {{"volume", order.volume},
-                   {"method", order.method},
+  json document = {{"method", order.method},
                    {"parameters", to_json(order.parameters)},
                    {"isovalues", "auto"},
                    {"mesh_formats", order.mesh_formats},
                    {"voxel_type", order.voxel_type},
                    {"outputs", order.outputs},
                    {"label", order.label}};
+  if (!order.volume.empty()) document["volume"] = order.volume;
+  if (order.source) {
+    document["source"] = {{"study", order.source->study}, {"series", order.source->series}};
+    if (order.source->preset.empty()) {
+      document["source"]["dicomweb"] = order.source->node;
+    } else {
+      document["source"]["preset"] = order.source->preset;
+    }
+  }
+  if (!order.destination.empty()) document["destination"] = order.destination;
   if (order.isovalues) document["isovalues"] = *order.isovalues;
   if (!order.mesh_frame.empty()) document["mesh_frame"] = order.mesh_frame;
   return document;

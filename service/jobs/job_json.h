@@ -3,13 +3,15 @@
 #include <nlohmann/json.hpp>
 #include <tl/expected.hpp>
 
-#include "service/jobs/job.h"
+#include "service/jobs/job_service.h"
 
 namespace volsmooth {
 
 /// The documents of the REST contract. Times are RFC 3339 UTC with milliseconds.
 nlohmann::json to_json(const StoredVolume& volume);
 nlohmann::json to_json(const Job& job);
+nlohmann::json to_json(const Delivery& delivery);
+nlohmann::json to_json(const LedgerEntry& entry);
 nlohmann::json to_json(const Result& result);
 nlohmann::json to_json(const JobOrder& order);
 nlohmann::json to_json(const JobProgress& progress);

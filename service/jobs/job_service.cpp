@@ -23,8 +23,8 @@ tl::unexpected<Problem> too_large(std::int64_t limit_bytes) {
 
 }  // namespace
 
-JobService::JobService(JobServiceSettings settings, Engine engine)
-    : state_(std::make_unique<State>(std::move(settings), std::move(engine))) {}
+JobService::JobService(JobServiceSettings settings, Engine engine, Pacs pacs)
+    : state_(std::make_unique<State>(std::move(settings), std::move(engine), std::move(pacs))) {}
 
 JobService::~JobService() {
   stop();
@@ -32,13 +32,16 @@ JobService::~JobService() {
 
 void JobService::start() {
   state_->started = true;
-  state_->pool.start();
+  for (WorkerPool* pool : {&state_->pool, &state_->retrievals, &state_->delivering, &state_->receiving})
+    pool->start();
 }
 
 void JobService::stop() {
   state_->stopping = true;
   state_->running.interrupt_all(RunningJob::Interruption::kStop);
-  state_->pool.stop();
+  state_->delivery_runner.stop();
+  for (WorkerPool* pool : {&state_->pool, &state_->retrievals, &state_->delivering, &state_->receiving})
+    pool->stop();
 }
 
 const Engine& JobService::engine() const {
@@ -76,6 +79,25 @@ tl::expected<StoredVolume, Problem> JobService::keep_volume(IncomingFile file, c
   return volume;
 }
 
+tl::expected<std::vector<ArrivedInstance>, Problem> JobService::receive(std::string_view preset,
+                                                                        IncomingFile file) {
+  if (std::ranges::find(state_->pacs.presets, preset, &Preset::name) == state_->pacs.presets.end())
+    return refuse("not-found", "The configuration has no such preset.");
+  if (file.bytes() > state_->settings.max_upload_bytes) return too_large(state_->settings.max_upload_bytes);
+  file.finish();
+  auto instances = state_->engine.instances(file.path());
+  if (!instances) return instances;
+  const std::string place = new_arrival_file();
+  state_->files.adopt(std::move(file), place);
+  try {
+    state_->arrivals.add(preset, place, *instances);
+  } catch (...) {
+    if (!state_->database.condemned()) state_->files.remove(place);
+    throw;
+  }
+  return instances;
+}
+
 std::vector<StoredVolume> JobService::volumes() {
   return state_->volumes.all();
 }
@@ -110,16 +132,20 @@ tl::expected<Job, Problem> JobService::submit(const JobOrder& order) {
   const auto no_volume = [] {
     return refuse("not-found", "There is no such volume.", {{"member", "volume"}});
   };
-  const auto volume = state_->volumes.find(order.volume);
-  if (!volume) return no_volume();
-  auto plan = state_->engine.plan(order, volume->facts);
-  if (!plan) return tl::unexpected(std::move(plan.error()));
+  JobPlan plan{order.parameters};
+  if (!order.source) {
+    const auto volume = state_->volumes.find(order.volume);
+    if (!volume) return no_volume();
+    auto made = state_->engine.plan(order, volume->facts);
+    if (!made) return tl::unexpected(std::move(made.error()));
+    plan = *std::move(made);
+  }
 
   Job job;
   job.id = new_id("j-");
   job.order = order;
-  job.parameters = std::move(plan->parameters);
-  job.memory_bytes = plan->memory_bytes;
+  job.parameters = std::move(plan.parameters);
+  job.memory_bytes = plan.memory_bytes;
   job.progress.stage = "queued";
   job.created_at = now_in_milliseconds();
   switch (state_->jobs.insert(job, state_->settings.max_queued)) {
@@ -131,7 +157,7 @@ tl::expected<Job, Problem> JobService::submit(const JobOrder& order) {
     case JobStore::Insertion::kDone:
       break;
   }
-  state_->pool.wake();
+  (order.source ? state_->retrievals : state_->pool).wake();
   return job;
 }
 
@@ -197,6 +223,17 @@ tl::expected<StoredFile, Problem> JobService::result(std::string_view job_id, st
   if (result == found->results.end()) return refuse("not-found", "The job has no result of that name.");
   return state_->stored_file(results_directory(*found) + "/" + result->name, result->media_type,
                              result->bytes, result->sha256);
+}
+
+tl::expected<std::vector<LedgerEntry>, Problem> JobService::ledger(std::string_view job_id) {
+  const auto found = job(job_id);
+  if (!found) return tl::unexpected(found.error());
+  return state_->deliveries.ledger(job_id);
+}
+
+tl::expected<Job, Problem> JobService::deliver_again(std::string_view job_id) {
+  if (state_->deliveries.retry(job_id)) state_->delivering.wake();
+  return job(job_id);
 }
 
 tl::expected<std::vector<JobEvent>, Problem> JobService::events_after(std::string_view job_id,

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -11,6 +12,7 @@
 #include <vector>
 
 #include "service/jobs/job.h"
+#include "service/jobs/pacs.h"
 #include "service/storage/incoming_file.h"
 
 namespace volsmooth {
@@ -25,6 +27,8 @@ struct JobServiceSettings {
   std::int64_t reserved_disk_bytes = std::int64_t{64} << 20;
   int max_deaths = 10;  ///< a job that was running at this many deaths of the daemon is failed
   int max_queued = 10'000;
+  std::chrono::milliseconds node_patience = std::chrono::hours(24);  ///< a node that is down is asked again
+  std::chrono::milliseconds longest_node_pause = std::chrono::minutes(5);
 };
 
 /// With what follows from the machine filled in (jobs/machine.h).
@@ -60,6 +64,13 @@ struct ServiceStatistics {
   std::int64_t queued = 0, running = 0, volumes = 0, jobs_total = 0, stored_bytes = 0, free_disk_bytes = 0;
 };
 
+/// Where one instance of a delivery is.
+struct LedgerEntry {
+  DicomInstance instance;
+  std::string state;   ///< "pending", "stored" or "refused"
+  std::string reason;  ///< the node's, of one that it refused
+};
+
 /// The rules of uploads and jobs: everything the outside can ask for, durable before it is answered.
 /// Thread-safe; calls may block on the disk, none computes except `keep_volume`, which verifies the whole
 /// file. Problems it gives (slugs): not-found, gone, bad-id, volume-in-use, insufficient-storage,
@@ -67,8 +78,8 @@ struct ServiceStatistics {
 /// give. Throws when the store itself fails.
 class JobService {
  public:
-  JobService(JobServiceSettings settings,
-             Engine engine);  ///< opens and recovers the store; throws std::runtime_error
+  /// Opens and recovers the store; throws std::runtime_error.
+  JobService(JobServiceSettings settings, Engine engine, Pacs pacs = {});
   ~JobService();
 
   void start();  ///< workers begin to claim jobs
@@ -80,6 +91,10 @@ class JobService {
 
   tl::expected<IncomingFile, Problem> begin_upload(std::optional<std::int64_t> declared_bytes);
   tl::expected<StoredVolume, Problem> keep_volume(IncomingFile file, const UploadOptions& options);
+  /// Takes DICOM instances that a device sends to a preset; durable when it returns. When its series has been
+  /// quiet for a while, a job of the preset runs on it. Gives what was in the file.
+  tl::expected<std::vector<ArrivedInstance>, Problem> receive(std::string_view preset, IncomingFile file);
+
   std::vector<StoredVolume> volumes();
   tl::expected<StoredVolume, Problem> volume(std::string_view id);
   tl::expected<StoredFile, Problem> volume_content(std::string_view id);
@@ -95,6 +110,11 @@ class JobService {
       std::string_view id,
       const std::function<bool(const Job&)>& is_wanted = [](const Job&) { return true; });
   tl::expected<StoredFile, Problem> result(std::string_view job_id, std::string_view name);
+
+  /// The ledger of a job's delivery; empty until it has begun.
+  tl::expected<std::vector<LedgerEntry>, Problem> ledger(std::string_view job_id);
+  /// Begins a failed delivery again, with the instances that are not stored yet; any other stays as it is.
+  tl::expected<Job, Problem> deliver_again(std::string_view job_id);
 
   /// The events of a job after `last_event_id` (empty: all that are kept).
   tl::expected<std::vector<JobEvent>, Problem> events_after(std::string_view job_id,

@@ -2,8 +2,10 @@
 
 #include <stdexcept>
 
+#include "service/jobs/delivery_store.h"
 #include "service/jobs/job_json.h"
 #include "service/jobs/stored_json.h"
+#include "service/jobs/volume_store.h"
 
 namespace volsmooth {
 namespace {
@@ -12,7 +14,7 @@ using nlohmann::json;
 
 constexpr std::string_view kSelectJob =
     "SELECT sequence, id, state, job_order, parameters, memory_bytes, created_ms, started_ms, finished_ms, "
-    "attempt, stage, fraction, error, deaths, cancel_requested FROM jobs ";
+    "attempt, stage, fraction, error, deaths, cancel_requested, not_before_ms, source_tries FROM jobs ";
 
 std::optional<Time> time_or_none(const Statement& row, int column) {
   if (row.is_null(column)) return std::nullopt;
@@ -57,7 +59,12 @@ JobStore::Listed job_from(Database& database, const Statement& row) {
   job.attempt = static_cast<int>(row.integer(9));
   job.progress = {row.text(10), row.real(11), std::nullopt};
   if (!row.is_null(12)) job.error = problem_from_stored_json(json::parse(row.text(12)));
-  if (job.state == JobState::kSucceeded) job.results = results_of(database, sequence);
+  if (job.state == JobState::kQueued && row.integer(15) > 0) job.next_attempt_at = time_of(row.integer(15));
+  job.source_tries = static_cast<int>(row.integer(16));
+  if (job.state == JobState::kSucceeded) {
+    job.results = results_of(database, sequence);
+    if (!job.order.destination.empty()) job.delivery = delivery_of(database, sequence);
+  }
   return {std::move(job), sequence};
 }
 
@@ -96,23 +103,40 @@ std::string results_directory(std::string_view job_id, std::int64_t attempt) {
   return "results/" + std::string(job_id) + "." + std::to_string(attempt);
 }
 
+/// The row of a job for a volume that is here, or for a series that is still at its source.
+int insert_row(Database& database, const Job& job) {
+  return database.run(
+      "INSERT INTO jobs (id, volume, method, label, state, job_order, parameters, memory_bytes, created_ms, "
+      "stage) "
+      "SELECT ?1, ?2, ?3, ?4, 'queued', ?5, ?6, ?7, ?8, 'queued' "
+      "WHERE ?2 = '' OR EXISTS (SELECT 1 FROM volumes WHERE id = ?2)",
+      job.id, job.order.volume, job.order.method, job.order.label, to_json(job.order).dump(),
+      to_json(job.parameters).dump(), job.memory_bytes, milliseconds_of(job.created_at));
+}
+
+void take_retrieved(Database& database, const std::string& job_id, const Retrieved& retrieved) {
+  insert_volume(database, retrieved.volume);
+  JobOrder order = find_in(database, job_id).value().order;
+  order.volume = retrieved.volume.id;
+  database.run(
+      "UPDATE jobs SET volume = ?2, job_order = ?3, parameters = ?4, memory_bytes = ?5 WHERE id = ?1", job_id,
+      order.volume, to_json(order).dump(), to_json(retrieved.plan.parameters).dump(),
+      retrieved.plan.memory_bytes);
+}
+
 constexpr std::string_view kCountQueued = "SELECT count(*) FROM jobs WHERE state = 'queued'";
 
 }  // namespace
 
-JobStore::Insertion JobStore::insert(const Job& job, int max_queued) {
+JobStore::Insertion JobStore::insert(const Job& job, int max_queued,
+                                     const std::function<void(Database&)>& also) {
   return database_.write([&](Database& database) {
     if (count(database, kCountQueued) >= max_queued) return Insertion::kQueueFull;
-    const int inserted = database.run(
-        "INSERT INTO jobs (id, volume, method, label, state, job_order, parameters, memory_bytes, "
-        "created_ms, stage) "
-        "SELECT ?1, id, ?3, ?4, 'queued', ?5, ?6, ?7, ?8, 'queued' FROM volumes WHERE id = ?2",
-        job.id, job.order.volume, job.order.method, job.order.label, to_json(job.order).dump(),
-        to_json(job.parameters).dump(), job.memory_bytes, milliseconds_of(job.created_at));
-    if (inserted == 0) return Insertion::kNoVolume;
+    if (insert_row(database, job) == 0) return Insertion::kNoVolume;
     insert_event(database, job.id,
                  {events_.next(), "state", state_event_data(job.id, JobState::kQueued, {}, {})});
     audit(database, job.id, "job queued");
+    also(database);
     return Insertion::kDone;
   });
 }
@@ -137,16 +161,21 @@ std::vector<JobStore::Listed> JobStore::list(const JobQuery& query, std::optiona
   });
 }
 
-std::optional<Job> JobStore::claim(std::int64_t most_memory_bytes) {
-  if (!database_.read([&](Database& database) { return count(database, kCountQueued); })) return std::nullopt;
+std::optional<Job> JobStore::claim(std::int64_t most_memory_bytes, Work work) {
+  const bool has_volume = work == Work::kCompute;
+  const std::int64_t now = milliseconds_of(now_in_milliseconds());
+  const auto oldest = [&](Database& database) {
+    return database.query(
+        "SELECT id, attempt, memory_bytes FROM jobs WHERE sequence = (SELECT min(sequence) FROM jobs "
+        "WHERE state = 'queued' AND (volume <> '') = ? AND not_before_ms <= ?)",
+        has_volume, now);
+  };
+  if (!database_.read([&](Database& database) { return oldest(database).step(); })) return std::nullopt;
   return database_.write([&](Database& database) -> std::optional<Job> {
-    Statement head = database.query(
-        "SELECT id, attempt FROM jobs WHERE memory_bytes <= ? AND sequence = "
-        "(SELECT min(sequence) FROM jobs WHERE state = 'queued')",
-        most_memory_bytes);
-    if (!head.step()) return std::nullopt;
+    Statement head = oldest(database);
+    if (!head.step() || head.integer(2) > most_memory_bytes) return std::nullopt;
     JobChange claimed{head.text(0), static_cast<int>(head.integer(1)), JobState::kQueued, JobState::kRunning,
-                      JobProgress{"read", 0, std::nullopt}};
+                      JobProgress{has_volume ? "read" : "retrieve", 0, std::nullopt}};
     change_in(database, claimed);
     return find_in(database, claimed.id);
   });
@@ -171,16 +200,22 @@ bool JobStore::change_in(Database& database, const JobChange& change) {
   const int changed = database.run(
       "UPDATE jobs SET state = ?4, attempt = attempt + (?4 = 'running'), deaths = deaths + ?5, "
       "started_ms = CASE ?4 WHEN 'running' THEN ?6 WHEN 'queued' THEN NULL ELSE started_ms END, "
-      "finished_ms = ?7, stage = ?8, fraction = ?9, error = ?10 "
+      "finished_ms = ?7, stage = ?8, fraction = ?9, error = ?10, not_before_ms = ?11, "
+      "source_tries = source_tries + (?11 > 0) "
       "WHERE id = ?1 AND attempt = ?2 AND state = ?3 AND (cancel_requested = 0 OR ?4 = 'cancelled')",
       change.id, change.attempt, name_of(change.from), name_of(change.to), change.deaths, started_ms,
-      finished_ms, change.progress.stage, change.progress.fraction, error);
+      finished_ms, change.progress.stage, change.progress.fraction, error,
+      change.not_before ? milliseconds_of(*change.not_before) : 0);
   if (changed == 0) return false;
 
   for (const NumberedEvent& event : change.progress_events) insert_event(database, change.id, event);
   insert_event(database, change.id,
                {events_.next(), "state", state_event_data(change.id, change.to, finished, change.error)});
   insert_results(database, change.id, change.results);
+  if (change.retrieved) take_retrieved(database, change.id, *change.retrieved);
+  if (change.to == JobState::kSucceeded)
+    if (const auto job = find_in(database, change.id); !job->order.destination.empty())
+      insert_delivery(database, change.id, job->order.destination);
   audit(database, change.id, "job " + std::string(name_of(change.to)));
   return true;
 }

@@ -12,6 +12,12 @@
 
 namespace volsmooth {
 
+/// What a job runs on, once its series has come from its source.
+struct Retrieved {
+  StoredVolume volume;
+  JobPlan plan;
+};
+
 /// One step in a job's life and what becomes known with it.
 struct JobChange {
   std::string id;
@@ -23,6 +29,8 @@ struct JobChange {
   std::vector<Result> results = {};
   std::vector<NumberedEvent> progress_events = {};  ///< of the attempt that ends
   int deaths = 0;                                   ///< of the daemon, to be counted against the job
+  std::optional<Retrieved> retrieved = {};          ///< the volume is inserted with the step
+  std::optional<Time> not_before = {};              ///< the source could not give it; to be tried then
 };
 
 /// Rows of jobs. Every step in a job's life is one conditional UPDATE, with the state and the attempt as the
@@ -34,7 +42,9 @@ class JobStore {
   EventCounter& event_counter() { return events_; }
 
   enum class Insertion { kDone, kNoVolume, kQueueFull };
-  Insertion insert(const Job& job, int max_queued);
+  /// `also` is done in the same transaction, with the job there.
+  Insertion insert(
+      const Job& job, int max_queued, const std::function<void(Database&)>& also = [](Database&) {});
 
   std::optional<Job> find(std::string_view id);
   /// Newest first, at most `query.limit` + 1 of those older than `before` (a sequence number).
@@ -44,8 +54,11 @@ class JobStore {
   };
   std::vector<Listed> list(const JobQuery& query, std::optional<std::int64_t> before);
 
-  /// The oldest queued job becomes a running one, provided that it needs no more memory than this.
-  std::optional<Job> claim(std::int64_t most_memory_bytes);
+  /// What is to be done for a queued job: fetch its series, or compute.
+  enum class Work { kRetrieve, kCompute };
+  /// The oldest queued job with that to be done becomes a running one, provided that it needs no more memory
+  /// than this.
+  std::optional<Job> claim(std::int64_t most_memory_bytes, Work work = Work::kCompute);
   /// False: the job is not in that state and attempt any more, or was asked to be cancelled.
   bool change(const JobChange& change);
 

@@ -83,6 +83,36 @@ Checked read_volume(const json& value, JobOrder& order) {
                                 {{"member", "volume"}}});
 }
 
+/// PS3.5, 6.2: UI holds digits and dots, at most 64 of them.
+bool is_uid(const json& value) {
+  if (!value.is_string()) return false;
+  const auto& text = value.get_ref<const std::string&>();
+  return !text.empty() && text.size() <= 64 && text.find_first_not_of("0123456789.") == std::string::npos;
+}
+
+Checked read_source(const json& value, JobOrder& order) {
+  const auto refused = [] {
+    return bad("source",
+               "an object with the members dicomweb (the name of a node), study and series (DICOM UIDs)");
+  };
+  if (!value.is_object() || value.size() != 3) return refused();
+  const char* const place = value.contains("preset") ? "preset" : "dicomweb";
+  const json name = value.value(place, json());
+  if (!name.is_string() || !is_id_shaped(name.get<std::string>()) || !is_uid(value.value("study", json())) ||
+      !is_uid(value.value("series", json())))
+    return refused();
+  order.source = DicomSource{"", value["study"], value["series"]};
+  (place == std::string_view("preset") ? order.source->preset : order.source->node) = name;
+  return {};
+}
+
+Checked read_destination(const json& value, JobOrder& order) {
+  if (!value.is_string() || !is_id_shaped(value.get<std::string>()))
+    return bad("destination", "the name of a node of the service's configuration");
+  order.destination = value.get<std::string>();
+  return {};
+}
+
 Checked read_method(const json& value, JobOrder& order) {
   if (!value.is_string()) return bad("method", "the name of a method (GET /v1/methods lists them)");
   order.method = value.get<std::string>();
@@ -179,15 +209,17 @@ struct Member {
   Checked (*read)(const json& value, JobOrder& order);
 };
 
-constexpr std::array<Member, 9> kMembers = {{{"volume", read_volume},
-                                             {"method", read_method},
-                                             {"parameters", read_parameters},
-                                             {"isovalues", read_isovalues},
-                                             {"mesh_formats", read_mesh_formats},
-                                             {"mesh_frame", read_mesh_frame},
-                                             {"voxel_type", read_voxel_type},
-                                             {"outputs", read_outputs},
-                                             {"label", read_label}}};
+constexpr std::array<Member, 11> kMembers = {{{"volume", read_volume},
+                                              {"source", read_source},
+                                              {"method", read_method},
+                                              {"parameters", read_parameters},
+                                              {"isovalues", read_isovalues},
+                                              {"mesh_formats", read_mesh_formats},
+                                              {"mesh_frame", read_mesh_frame},
+                                              {"voxel_type", read_voxel_type},
+                                              {"outputs", read_outputs},
+                                              {"destination", read_destination},
+                                              {"label", read_label}}};
 
 std::string known_members() {
   std::vector<std::string_view> names;
@@ -221,7 +253,8 @@ tl::expected<JobOrder, Problem> order_from(const json& document) {
   for (const auto& [name, value] : document.items())
     if (std::ranges::find(kMembers, name, &Member::name) == kMembers.end())
       return unknown(name, known_members());
-  if (!document.contains("volume")) return bad("volume", "given: the id of the volume to smooth");
+  if (!document.contains("volume") && !document.contains("source"))
+    return bad("volume", "given: the id of the volume to smooth");
 
   JobOrder order;
   for (const auto& [name, value] : document.items())

@@ -18,7 +18,7 @@ constexpr auto kFirstEstimate = 2s;  // before it the elapsed time says little
 }  // namespace
 
 RunningJob::RunningJob(const Job& job, EventCounter& numbers)
-    : id_(job.id), memory_bytes_(job.memory_bytes), numbers_(numbers) {}
+    : id_(job.id), memory_bytes_(job.memory_bytes), numbers_(numbers), stage_(job.progress.stage) {}
 
 void RunningJob::interrupt(Interruption why) {
   Interruption none = Interruption::kNone;

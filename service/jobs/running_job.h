@@ -44,7 +44,7 @@ class RunningJob {
   std::atomic<Interruption> interruption_ = Interruption::kNone;
 
   mutable std::mutex mutex_;  // guards what follows
-  std::string stage_ = "read";
+  std::string stage_;
   double fraction_ = 0;
   std::vector<NumberedEvent> events_;
   double told_fraction_ = 0;

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <limits>
 #include <set>
+#include <stdexcept>
+#include <thread>
 
 #include "service/jobs/ids.h"
 #include "service/jobs/job_json.h"
@@ -12,6 +14,8 @@
 
 namespace volsmooth {
 namespace {
+
+constexpr int kExchanges = 2;  ///< with nodes, at the same time and in each direction
 
 std::vector<std::string> names_of(const auto& offered) {
   std::vector<std::string> names;
@@ -31,15 +35,27 @@ JobServiceSettings completed(JobServiceSettings settings) {
   return settings;
 }
 
-JobService::State::State(JobServiceSettings given, Engine computing)
+JobService::State::State(JobServiceSettings given, Engine computing, Pacs network)
     : settings(completed(std::move(given))),
       engine(std::move(computing)),
+      pacs(std::move(network)),
       files(settings.data_dir, settings.reserved_disk_bytes),
       database(files.path_of("volsmooth.db")),
       volumes(database),
       jobs(database),
+      deliveries(database),
+      arrivals(database),
       runner(engine, files, database, settings.threads, [this](const std::string& id) { wakes.wake(id); }),
-      pool(settings.workers, [this] { return claim(); }) {
+      source_runner(engine, pacs, files, database, settings,
+                    [this](const std::string& id) { wakes.wake(id); }),
+      delivery_runner(pacs, files, database, jobs, settings,
+                      [this](const std::string& id) { wakes.wake(id); }),
+      pool(settings.workers, [this] { return claim(JobStore::Work::kCompute); }),
+      retrievals(pacs.nodes.empty() && pacs.presets.empty() ? 0 : kExchanges,
+                 [this] { return claim(JobStore::Work::kRetrieve); }),
+      delivering(pacs.nodes.empty() ? 0 : kExchanges, [this] { return delivery_runner.claim(); }),
+      receiving(pacs.presets.empty() ? 0 : 1, [this] { return claim_arrivals(); }) {
+  check_presets();
   recover();
   sweep();
 }
@@ -69,24 +85,36 @@ void JobService::State::recover() {
   }
 }
 
+/// A preset that no job could be made of is the configuration's fault, not that of the devices.
+void JobService::State::check_presets() const {
+  for (const Preset& preset : pacs.presets) {
+    JobOrder order = preset.order;
+    order.volume = "v-0";
+    if (const auto checked = check(order); !checked)
+      throw std::runtime_error("configuration, preset '" + preset.name + "': " + checked.error().detail);
+  }
+}
+
 /// Files that no row points to: what was being written, or deleted, when the last daemon ended.
 void JobService::State::sweep() {
   std::set<std::string, std::less<>> wanted = jobs.results_directories();
   for (const StoredVolume& volume : volumes.all()) wanted.insert(volume_file(volume.id));
-  for (const std::string folder : {"volumes", "results"})
+  for (const std::string& file : arrivals.files()) wanted.insert(file);
+  for (const std::string folder : {"volumes", "results", "arrivals"})
     files.sweep(folder,
                 [&](std::string_view name) { return wanted.contains(folder + "/" + std::string(name)); });
 }
 
-WorkerPool::Work JobService::State::claim() {
+WorkerPool::Work JobService::State::claim(JobStore::Work work) {
   const std::lock_guard lock(claiming);
   if (stopping) return {};
   recover();
   // Strictly the oldest first: when it does not fit beside the running ones, the others wait with it for
   // these to end, so nothing starves. Alone, a job always fits.
-  const std::int64_t free = running.empty() ? std::numeric_limits<std::int64_t>::max()
-                                            : settings.memory_limit_bytes - running.memory_bytes();
-  auto job = jobs.claim(free);
+  const std::int64_t used = running.memory_bytes();
+  const std::int64_t free =
+      used == 0 ? std::numeric_limits<std::int64_t>::max() : settings.memory_limit_bytes - used;
+  auto job = jobs.claim(free, work);
   if (!job) return {};
   const auto claimed =
       std::make_shared<ClaimedJob>(*std::move(job), jobs.event_counter(), running,
@@ -96,20 +124,60 @@ WorkerPool::Work JobService::State::claim() {
   if (!jobs.is_wanted(id)) claimed->running().interrupt(RunningJob::Interruption::kCancel);
   if (stopping) claimed->running().interrupt(RunningJob::Interruption::kStop);
   wakes.wake(id);
-  return [this, claimed] { runner.run(*claimed); };
+  if (work == JobStore::Work::kCompute) return [this, claimed] { runner.run(*claimed); };
+  return [this, claimed] {
+    source_runner.run(*claimed);
+    pool.wake();
+  };
 }
 
 bool JobService::State::settle(const JobChange& change) {
   if (!jobs.change(change)) return false;
   // The change stands; who cannot be told of it must not undo it.
   try {
-    if (is_final(change.to))
-      if (const auto job = jobs.find(change.id)) tell_final(*job);
+    if (is_final(change.to) || change.retrieved)
+      if (const auto job = jobs.find(change.id)) {
+        forget_arrivals(*job);
+        if (job->delivery) delivering.wake();
+        if (is_final(change.to)) tell_final(*job);
+      }
     wakes.wake(change.id);
   } catch (const std::exception& error) {
     spdlog::error("job {}: news of it got lost: {}", change.id, error.what());
   }
   return true;
+}
+
+void JobService::State::forget_arrivals(const Job& job) {
+  if (!job.order.source || job.order.source->preset.empty()) return;
+  for (const std::string& file : arrivals.forget(job.id)) files.remove(file);
+}
+
+WorkerPool::Work JobService::State::claim_arrivals() {
+  if (stopping) return {};
+  for (const Preset& preset : pacs.presets) {
+    auto series = arrivals.quiet_since(preset.name, now_in_milliseconds() - preset.quiet);
+    if (series) return [this, &preset, series = *std::move(series)] { start_job_of(preset, series); };
+  }
+  return {};
+}
+
+/// Its arrivals wait until the queue has room.
+void JobService::State::start_job_of(const Preset& preset, const DicomSource& series) {
+  Job job;
+  job.id = new_id("j-");
+  job.order = preset.order;
+  job.order.source = series;
+  job.parameters = job.order.parameters;
+  job.progress.stage = "queued";
+  job.created_at = now_in_milliseconds();
+  const auto outcome =
+      jobs.insert(job, settings.max_queued, [&](Database& writer) { hand_over(writer, series, job.id); });
+  if (outcome == JobStore::Insertion::kDone) {
+    retrievals.wake();
+  } else {
+    std::this_thread::sleep_for(std::chrono::seconds(1));
+  }
 }
 
 void JobService::State::tell_final(const Job& job) const {
@@ -150,6 +218,36 @@ Job JobService::State::with_progress(Job job) const {
   return job;
 }
 
+/// The nodes that an order names are there and do what it wants of them.
+tl::expected<void, Problem> JobService::State::check_nodes(const JobOrder& order) const {
+  const auto unknown = [&](const std::string& member, const auto& does_it) -> tl::expected<void, Problem> {
+    std::vector<std::string> names;
+    for (const Pacs::Node& node : pacs.nodes)
+      if (std::invoke(does_it, node)) names.push_back(node.name);
+    return refuse("bad-parameter",
+                  "'" + member + "' must name a node of the service's configuration that can do this.",
+                  {{"member", member}, {"choices", names}});
+  };
+  const auto find = [&](const std::string& name) {
+    return std::ranges::find(pacs.nodes, name, &Pacs::Node::name);
+  };
+  if (order.source) {
+    if (!order.volume.empty())
+      return refuse("bad-parameter", "'source' must be given without 'volume': the two say the same thing.",
+                    {{"member", "source"}});
+    if (const auto node = find(order.source->node); node == pacs.nodes.end() || !node->gives)
+      return unknown("source", &Pacs::Node::gives);
+  }
+  if (order.destination.empty()) return {};
+  if (find(order.destination) == pacs.nodes.end())
+    return unknown("destination", [](const Pacs::Node&) { return true; });
+  if (std::ranges::none_of(order.outputs, [](const std::string& name) { return name.starts_with("dicom"); }))
+    return refuse("bad-parameter",
+                  "'destination' gets DICOM objects only; name one in 'outputs', such as dicom-series.",
+                  {{"member", "destination"}});
+  return {};
+}
+
 /// All about an order that can be said without its volume.
 tl::expected<void, Problem> JobService::State::check(const JobOrder& order) const {
   if (auto members = order_from(to_json(order)); !members) return tl::unexpected(std::move(members.error()));
@@ -161,6 +259,7 @@ tl::expected<void, Problem> JobService::State::check(const JobOrder& order) cons
     if (std::ranges::find(engine.mesh_formats, name, &Engine::Format::name) == engine.mesh_formats.end())
       return refuse("bad-parameter", "'mesh_formats' must be a list of formats that GET /v1/formats lists.",
                     {{"member", "mesh_formats"}, {"choices", names_of(engine.mesh_formats)}});
+  if (auto nodes = check_nodes(order); !nodes) return nodes;
   return check_parameters(order.parameters, *method);
 }
 

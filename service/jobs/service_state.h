@@ -5,11 +5,14 @@
 #include <mutex>
 #include <string>
 
+#include "service/jobs/arrival_store.h"
 #include "service/jobs/claimed_job.h"
+#include "service/jobs/delivery_runner.h"
 #include "service/jobs/job_runner.h"
 #include "service/jobs/job_service.h"
 #include "service/jobs/job_store.h"
 #include "service/jobs/running_jobs.h"
+#include "service/jobs/source_runner.h"
 #include "service/jobs/volume_store.h"
 #include "service/jobs/wake_list.h"
 #include "service/jobs/worker_pool.h"
@@ -23,15 +26,22 @@ tl::unexpected<Problem> refuse(std::string slug, std::string detail,
 
 /// The parts of the service and what they do together; job_service.cpp adds the answers to the outside.
 struct JobService::State {
-  State(JobServiceSettings given, Engine computing);
+  State(JobServiceSettings given, Engine computing, Pacs network);
 
-  void sweep();  ///< at the start
+  // At the start.
+  void check_presets() const;
+  void sweep();
 
   // Running jobs.
   void recover();  ///< holding `claiming`, or before the start
-  WorkerPool::Work claim();
+  WorkerPool::Work claim(JobStore::Work work);
   bool settle(const JobChange& change);
   void tell_final(const Job& job) const;
+
+  // What devices send to presets.
+  WorkerPool::Work claim_arrivals();  ///< of a series that has become whole: makes its job
+  void start_job_of(const Preset& preset, const DicomSource& series);
+  void forget_arrivals(const Job& job);  ///< when it needs them no more
 
   // Answers.
   /// What the engine says of an upload; not-ready when the service is stopped meanwhile.
@@ -43,22 +53,28 @@ struct JobService::State {
   tl::expected<void, Problem> unless_gone(std::string_view id, std::string_view what);
   Job with_progress(Job job) const;
   tl::expected<void, Problem> check(const JobOrder& order) const;
+  tl::expected<void, Problem> check_nodes(const JobOrder& order) const;
   tl::expected<StoredFile, Problem> stored_file(const std::string& name, const std::string& media_type,
                                                 std::int64_t bytes, const std::string& sha256) const;
 
   const JobServiceSettings settings;
   const Engine engine;
+  const Pacs pacs;
   FileStore files;
   StoreDatabase database;
   VolumeStore volumes;
   JobStore jobs;
+  DeliveryStore deliveries;
+  ArrivalStore arrivals;
   WakeList wakes;
   RunningJobs running;
   JobRunner runner;
+  SourceRunner source_runner;
+  DeliveryRunner delivery_runner;
   std::function<void(const Job&)> observer;
   std::mutex claiming;
   std::atomic<bool> started = false, stopping = false;
-  WorkerPool pool;  // last: its threads use all of the above
+  WorkerPool pool, retrievals, delivering, receiving;  // last: their threads use all of the above
 };
 
 }  // namespace volsmooth

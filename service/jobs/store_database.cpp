@@ -77,8 +77,51 @@ constexpr const char* kIndexByState = R"(
   CREATE INDEX jobs_by_state ON jobs (state, sequence);
 )";
 
+/// Jobs whose series is still at a node, and results on their way to one.
+constexpr const char* kNodes = R"(
+  ALTER TABLE jobs ADD COLUMN not_before_ms INTEGER NOT NULL DEFAULT 0;
+  ALTER TABLE jobs ADD COLUMN source_tries INTEGER NOT NULL DEFAULT 0;
+
+  CREATE TABLE deliveries (
+    job         INTEGER PRIMARY KEY REFERENCES jobs (sequence) ON DELETE CASCADE,
+    destination TEXT NOT NULL,
+    state       TEXT NOT NULL,
+    tries       INTEGER NOT NULL,
+    next_ms     INTEGER NOT NULL,
+    since_ms    INTEGER NOT NULL,
+    error       TEXT
+  ) STRICT;
+  CREATE INDEX pending_deliveries ON deliveries (next_ms) WHERE state = 'pending';
+
+  CREATE TABLE delivered_instances (
+    job              INTEGER NOT NULL REFERENCES jobs (sequence) ON DELETE CASCADE,
+    sop_instance_uid TEXT NOT NULL,
+    sop_class_uid    TEXT NOT NULL,
+    result           TEXT NOT NULL,
+    state            TEXT NOT NULL,
+    reason           TEXT NOT NULL,
+    UNIQUE (job, sop_instance_uid)
+  ) STRICT;
+
+  CREATE TABLE arrivals (
+    sequence         INTEGER PRIMARY KEY AUTOINCREMENT,
+    preset           TEXT NOT NULL,
+    study            TEXT NOT NULL,
+    series           TEXT NOT NULL,
+    sop_instance_uid TEXT NOT NULL,
+    file             TEXT NOT NULL,
+    offset           INTEGER NOT NULL,
+    bytes            INTEGER NOT NULL,
+    received_ms      INTEGER NOT NULL,
+    job              INTEGER REFERENCES jobs (sequence) ON DELETE CASCADE
+  ) STRICT;
+  CREATE UNIQUE INDEX waiting_arrivals ON arrivals (preset, study, series, sop_instance_uid) WHERE job IS NULL;
+  CREATE INDEX arrivals_of_jobs ON arrivals (job);
+  CREATE INDEX arrivals_by_file ON arrivals (file);
+)";
+
 /// What makes each version of the schema of the one before.
-constexpr std::array kVersions = {kFirstSchema, kIndexByState};
+constexpr std::array kVersions = {kFirstSchema, kIndexByState, kNodes};
 constexpr std::size_t kNewestVersion = kVersions.size();
 
 std::size_t schema_version(Database& database) {

@@ -18,14 +18,12 @@ StoredVolume volume_from(const Statement& row) {
 
 }  // namespace
 
-void VolumeStore::insert(const StoredVolume& volume) {
-  database_.write([&](Database& database) {
-    audit(database, volume.id, "volume stored");
-    return database.run(
-        "INSERT INTO volumes (id, options, facts, bytes, sha256, created_ms) VALUES (?, ?, ?, ?, ?, ?)",
-        volume.id, options_to_json(volume.options).dump(), facts_to_json(volume.facts).dump(), volume.bytes,
-        volume.sha256, milliseconds_of(volume.created_at));
-  });
+int insert_volume(Database& database, const StoredVolume& volume) {
+  audit(database, volume.id, "volume stored");
+  return database.run(
+      "INSERT INTO volumes (id, options, facts, bytes, sha256, created_ms) VALUES (?, ?, ?, ?, ?, ?)",
+      volume.id, options_to_json(volume.options).dump(), facts_to_json(volume.facts).dump(), volume.bytes,
+      volume.sha256, milliseconds_of(volume.created_at));
 }
 
 std::optional<StoredVolume> VolumeStore::find(std::string_view id) {

@@ -8,12 +8,17 @@
 
 namespace volsmooth {
 
+/// Part of the caller's transaction.
+int insert_volume(Database& database, const StoredVolume& volume);
+
 /// Rows of volumes. Thread-safe; throws DatabaseError.
 class VolumeStore {
  public:
   explicit VolumeStore(StoreDatabase& database) : database_(database) {}
 
-  void insert(const StoredVolume& volume);
+  void insert(const StoredVolume& volume) {
+    database_.write([&](Database& database) { return insert_volume(database, volume); });
+  }
   std::optional<StoredVolume> find(std::string_view id);
   std::vector<StoredVolume> all();  ///< newest first
 

@@ -46,9 +46,7 @@ tl::expected<Json, Problem> ask(const char* command, const Descriptor& upload, i
   IngestOrder order{.command = command, .upload = upload.get(), .output = output};
   order.options = ingest_options(options, limits, size_of(upload), voxels);
   order.patience = patience_for(order.options);
-  return run_ingest(program_of(limits), order, [&] { report(0); }).map([](const Json& answer) {
-    return answer.at("volume");
-  });
+  return run_ingest(program_of(limits), order, [&] { report(0); });
 }
 
 VolumeDescription description_from(const Json& volume) {
@@ -134,7 +132,9 @@ tl::expected<VolumeDescription, Problem> describe_dicom(const std::filesystem::p
                                                         const UploadOptions& options,
                                                         const PipelineLimits& limits,
                                                         const Progress& report) {
-  return ask("inspect", open_upload(file), -1, 0, options, limits, report).map(description_from);
+  return ask("inspect", open_upload(file), -1, 0, options, limits, report).map([](const Json& answer) {
+    return description_from(answer.at("volume"));
+  });
 }
 
 tl::expected<InputVolume, Problem> read_dicom(const std::filesystem::path& file, const StoredVolume& stored,
@@ -143,17 +143,32 @@ tl::expected<InputVolume, Problem> read_dicom(const std::filesystem::path& file,
   const std::int64_t count = voxel_count(stored.facts.size);
   const auto answer = ask("decode", open_upload(file), voxels.get(), count, stored.options, limits, report);
   if (!answer) return tl::unexpected(answer.error());
-  InputVolume input{description_from(*answer), nullptr};
+  const Json& decoded = answer->at("volume");
+  InputVolume input{description_from(decoded), nullptr};
   if (voxel_count(input.description.size) != count)
     throw std::runtime_error("a volume of another size was decoded");
   input.volume = make_volume(input.description.size, input.description.map);
   MemoryReader reader(voxels);
   reader.read(std::as_writable_bytes(voxels_of(*input.volume)), report);
-  if (const auto padded = answer->at("padded_voxels").get<std::size_t>(); padded > 0) {
+  if (const auto padded = decoded.at("padded_voxels").get<std::size_t>(); padded > 0) {
     auto bits = read_values<std::uint8_t>(reader, (static_cast<std::size_t>(count) + 7) / 8);
     input.padding = Padding(std::move(bits), read_values<float>(reader, padded));
   }
   return input;
+}
+
+tl::expected<std::vector<ArrivedInstance>, Problem> list_instances(const std::filesystem::path& file,
+                                                                   const PipelineLimits& limits) {
+  const auto instances_in = [](const Json& answer) {
+    std::vector<ArrivedInstance> instances;
+    for (const Json& one : answer.at("instances"))
+      instances.push_back({one.at("sop_class_uid"), one.at("sop_instance_uid"), one.at("study_uid"),
+                           one.at("series_uid"), one.at("offset"), one.at("bytes")});
+    return instances;
+  };
+  if (!is_dicom_upload(file))
+    return tl::unexpected(Problem{"dicom-no-images", "The body holds no DICOM file."});
+  return ask("instances", open_upload(file), -1, 0, {}, limits, no_progress).map(instances_in);
 }
 
 }  // namespace volsmooth

@@ -20,4 +20,8 @@ tl::expected<VolumeDescription, Problem> describe_dicom(const std::filesystem::p
 tl::expected<InputVolume, Problem> read_dicom(const std::filesystem::path& file, const StoredVolume& stored,
                                               const PipelineLimits& limits, const Progress& report);
 
+/// Which instances a body of DICOM files holds, by volsmooth-ingest.
+tl::expected<std::vector<ArrivedInstance>, Problem> list_instances(const std::filesystem::path& file,
+                                                                   const PipelineLimits& limits);
+
 }  // namespace volsmooth

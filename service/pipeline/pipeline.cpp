@@ -2,6 +2,7 @@
 
 #include "algorithms/catalog.h"
 #include "algorithms/formats/mesh_writers.h"
+#include "service/pipeline/dicom_reading.h"
 #include "service/pipeline/stages.h"
 
 namespace volsmooth {
@@ -14,6 +15,7 @@ Engine make_engine(const PipelineLimits& limits) {
   }
   engine.inspect = [limits](const std::filesystem::path& file, const UploadOptions& options,
                             const Progress& report) { return inspect_upload(file, options, limits, report); };
+  engine.instances = [limits](const std::filesystem::path& file) { return list_instances(file, limits); };
   engine.plan = [limits](const JobOrder& order, const VolumeFacts& volume) {
     return plan_job(order, volume, limits);
   };

@@ -37,6 +37,9 @@ const std::map<std::string, std::vector<std::string>> kMayInclude = {
     {"service/pipeline",
      {"service/jobs/job.h", "service/jobs/problem.h", "service/jobs/job_json.h", "algorithms/"}},
     {"service/ingest", {"algorithms/formats/", "algorithms/volume/geometry.h", "algorithms/surface/mesh.h"}},
+    {"service/pacs",
+     {"service/jobs/", "service/storage/incoming_file.h", "algorithms/progress.h",
+      "algorithms/formats/zip_"}},
     {"client", {}},
 };
 
@@ -47,13 +50,14 @@ const std::map<std::string, std::vector<std::string>> kLibraryHomes = {
     {"sqlite3", {"service/storage"}},
     {"spdlog/", {"service", "service/http", "service/jobs"}},
     {"prometheus/", {"service/http"}},
-    {"curl/", {"client"}},
+    {"curl/", {"client", "service/pacs"}},
     {"png", {"algorithms/formats"}},
     {"isa-l", {"algorithms/formats", "algorithms/formats/dicom"}},
     {"gdcm", {"algorithms/formats/dicom"}},
     {"seccomp", {"service/ingest"}},
     {"nlohmann/",
-     {"service", "service/http", "service/jobs", "service/pipeline", "service/ingest", "client"}},
+     {"service", "service/http", "service/jobs", "service/pacs", "service/pipeline", "service/ingest",
+      "client"}},
 };
 
 struct Include {

@@ -3,6 +3,7 @@
 
 #include <regex>
 
+#include "tests/support/dicom_maker.h"
 #include "tests/system/nifti_bytes.h"
 #include "tests/system/schema_check.h"
 #include "tests/system/service_client.h"
@@ -43,7 +44,10 @@ MATCHER_P(HasMembers, names, "") {
 class Api : public testing::Test {
  protected:
   static void SetUpTestSuite() {
-    daemon_.emplace(VOLSMOOTHD);
+    const TemporaryDirectory folder;
+    const std::string configuration = folder / "configuration.json";
+    std::ofstream(configuration) << R"({"presets": {"head": {}}})";
+    daemon_.emplace(VOLSMOOTHD, std::vector<std::string>{"--config", configuration});
     const ServiceClient service(*daemon_);
     volume_ = service.upload(ball_file());
     job_ = service.run({{"volume", volume_.at("id")},
@@ -310,6 +314,7 @@ TEST_F(Api, TheDaemonKeepsToItsOpenApiDocument) {
       if (method == "DELETE" && of_jobs) id = service_.submit({{"volume", id}});
       std::string target = std::regex_replace(pattern, std::regex(R"(\{id\})"), id);
       target = std::regex_replace(target, std::regex(R"(\{name\})"), "report.json");
+      target = std::regex_replace(target, std::regex(R"(\{preset\})"), "head");
 
       std::string body;
       HeaderFields headers{{"Connection", "close"}};
@@ -317,6 +322,7 @@ TEST_F(Api, TheDaemonKeepsToItsOpenApiDocument) {
         body = of_jobs ? json{{"volume", fresh_volume.at("id")}}.dump() : ball_file(8);
         headers["Content-Type"] = of_jobs ? "application/json" : "application/octet-stream";
       }
+      if (pattern.starts_with("/dicomweb")) body = files_of(series_of({})).front();
       const HttpResponse answer = service_.call(method, target, body, headers);
       ++calls;
       const std::string status = std::to_string(answer.status);

@@ -63,6 +63,8 @@ class Orthanc {
     expect_status(HttpConnection(port_).exchange("POST", "/instances", file, {}), 200);
   }
 
+  std::string address() const { return "http://127.0.0.1:" + std::to_string(port_) + "/dicom-web"; }
+
   json query(const std::string& target) const {
     const HeaderFields headers{{"Accept", "application/dicom+json"}};
     return expect_status(HttpConnection(port_).exchange("GET", "/dicom-web" + target, {}, headers), 200)
@@ -133,6 +135,148 @@ TEST(Pacs, FindsEveryDicomResultInTheStudyOfItsSource) {
     }
     EXPECT_EQ(first(instance, "00200052"), first(instances[0], "00200052"));
   }
+}
+
+/// The series of modality CT that are not the source, by their UIDs, with how many instances they have.
+std::map<std::string, int> derived_series_in(const Orthanc& archive, const std::string& study) {
+  std::map<std::string, int> found;
+  for (const json& series : archive.query("/studies/" + study + "/series?includefield=0008103E,00201209"))
+    if (first(series, "00080060") == "CT" && series.contains("0008103E") &&
+        first(series, "0008103E") == "mean-curvature-flow")
+      found[first(series, "0020000E")] = std::stoi(first(series, "00201209"));
+  return found;
+}
+
+/// A daemon with the archive as node "archive", nobody as node "down", and the preset "head".
+class Loop : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!std::filesystem::exists(kOrthanc) || !std::filesystem::exists(kDicomWeb))
+      GTEST_SKIP() << "no Orthanc";
+    archive_.emplace();
+    const auto configuration = folder_ / "configuration.json";
+    std::ofstream(configuration) << json{
+        {"nodes",
+         {{"archive", {{"dicomweb", archive_->address()}}},
+          {"down", {{"dicomweb", "http://127.0.0.1:" + std::to_string(free_port())}}}}},
+        {"presets",
+         {{"head",
+           {{"job", {{"isovalues", json::array()}, {"outputs", {"dicom-series"}}}},
+            {"destination", "archive"},
+            {"quiet_seconds", 8}}}}}};
+    daemon_.emplace(VOLSMOOTHD, std::vector<std::string>{"--config", configuration.string()});
+    for (const std::string& file : files_of(datasets_)) archive_->store(file);
+    const json studies = archive_->query("/studies");
+    study_ = first(studies[0], "0020000D");
+    series_ = first(archive_->query("/studies/" + study_ + "/series")[0], "0020000E");
+  }
+
+  json order(const std::string& from, const std::string& to) const {
+    return {{"source", {{"dicomweb", from}, {"study", study_}, {"series", series_}}},
+            {"destination", to},
+            {"isovalues", json::array()},
+            {"outputs", {"dicom-series"}}};
+  }
+
+  ServiceClient client() const { return ServiceClient(*daemon_); }
+
+  /// The job once its delivery is in that state.
+  json delivered(const std::string& id, const std::string& state) const {
+    json job;
+    const bool there = eventually([&] {
+      job = client().job(id);
+      return job.at("delivery").is_object() && job.at("delivery").at("state") == state;
+    });
+    if (!there) throw std::runtime_error("the delivery did not get there: " + job.dump());
+    return job;
+  }
+
+  TemporaryDirectory folder_;
+  std::vector<DicomDataset> datasets_ = series_of(phantom());
+  std::optional<Orthanc> archive_;
+  std::optional<Daemon> daemon_;
+  std::string study_, series_;
+};
+
+TEST_F(Loop, FetchesASeriesAndBringsItsResultBack) {
+  const std::string id = client().submit(order("archive", "archive"));
+  const json job = client().wait(id);
+  ASSERT_EQ(job.at("state"), "succeeded") << job;
+  const json delivery = delivered(id, "delivered").at("delivery");
+  EXPECT_EQ(delivery.at("stored"), datasets_.size());
+  const json ledger = client().get("/v1/jobs/" + id + "/delivery").at("instances");
+  ASSERT_EQ(ledger.size(), datasets_.size());
+  for (const json& entry : ledger) EXPECT_EQ(entry.at("state"), "stored");
+  const auto derived = derived_series_in(*archive_, study_);
+  ASSERT_EQ(derived.size(), 1u);
+  EXPECT_EQ(derived.begin()->second, std::ssize(datasets_));
+}
+
+TEST_F(Loop, WaitsForNodesThatAreDownAndSaysSo) {
+  const std::string waiting = client().submit(order("down", "archive"));
+  EXPECT_TRUE(eventually([&] {
+    const json job = client().job(waiting);
+    return job.at("progress").at("stage") == "waiting-for-source" && job.at("next_attempt_at").is_string() &&
+           job.at("error").at("type") == "/problems/node-unreachable";
+  }));
+
+  const std::string id = client().submit(order("archive", "down"));
+  ASSERT_EQ(client().wait(id).at("state"), "succeeded");
+  EXPECT_TRUE(eventually([&] {
+    const json delivery = client().job(id).at("delivery");
+    return delivery.at("state") == "pending" && delivery.at("tries") > 0 &&
+           delivery.at("error").at("type") == "/problems/node-unreachable";
+  }));
+
+  // Killed, it still knows both.
+  daemon_->kill();
+  daemon_->start();
+  EXPECT_EQ(client().job(id).at("delivery").at("state"), "pending");
+  EXPECT_EQ(client().job(waiting).at("state"), "queued");
+  expect_status(client().call("POST", "/v1/jobs/" + waiting + "/cancel"), 202);
+}
+
+TEST_F(Loop, AMissingSeriesFailsTheJob) {
+  json wanted = order("archive", "archive");
+  wanted["source"]["series"] = "1.2.3.4.5";
+  const json job = client().wait(client().submit(wanted));
+  EXPECT_EQ(job.at("state"), "failed");
+  EXPECT_EQ(job.at("error").at("type"), "/problems/source-not-found");
+}
+
+/// A device that knows nothing of REST sends one instance a request; a death of the daemon loses none.
+TEST_F(Loop, RunsThePresetOnWhatADeviceSends) {
+  int sent = 0;
+  for (const std::string& file : files_of(datasets_)) {
+    const HttpResponse answer =
+        client().call("POST", "/dicomweb/head/studies", multipart_of({file}, "b"),
+                      {{"Content-Type", "multipart/related; type=\"application/dicom\"; boundary=b"}});
+    ASSERT_EQ(answer.status, 200) << answer.body;
+    EXPECT_EQ(answer.document().at("00081199").at("Value").size(), 1u);
+    if (++sent == 5) {
+      daemon_->kill();
+      daemon_->start();
+    }
+  }
+  std::string id;
+  ASSERT_TRUE(eventually([&] {
+    const json jobs = client().get("/v1/jobs").at("jobs");
+    if (jobs.empty()) return false;
+    id = jobs.at(0).at("id");
+    return true;
+  }));
+  ASSERT_EQ(client().wait(id).at("state"), "succeeded") << client().job(id);
+  EXPECT_EQ(delivered(id, "delivered").at("delivery").at("stored"), datasets_.size());
+  EXPECT_EQ(derived_series_in(*archive_, study_).size(), 1u);
+  EXPECT_EQ(client().get("/v1/jobs").at("jobs").size(), 1u);
+}
+
+TEST_F(Loop, RefusesWhatIsNoDicomAndUnknownNames) {
+  const HeaderFields type{{"Content-Type", "application/octet-stream"}};
+  EXPECT_EQ(client().call("POST", "/dicomweb/head/studies", "no DICOM", type).status, 422);
+  EXPECT_EQ(client().call("POST", "/dicomweb/foot/studies", files_of(datasets_).front(), type).status, 404);
+  EXPECT_EQ(client().try_submit(order("nobody", "archive")).status, 422);
+  EXPECT_EQ(client().try_submit(order("archive", "nobody")).status, 422);
 }
 
 }  // namespace

@@ -22,6 +22,9 @@ class UploadedFiles {
 
   std::size_t count() const { return entries_.size(); }
 
+  /// One file of a multipart body, or the only one, as it lies in the upload; of a zip, the zip.
+  std::span<const std::byte> stored(std::size_t which) const { return entries_.at(which).stored; }
+
   /// The bytes of one file, valid until the next call for another. A Part 10 file in the deflated transfer
   /// syntax comes out inflated, as the explicit little endian file that it is then. Refusals: those of
   /// `unpack`, decompression-limit.

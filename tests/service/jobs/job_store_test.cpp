@@ -258,7 +258,10 @@ TEST(StoreDatabase, TakesOverWhatAnEarlierVersionWrote) {
     Database as_it_was(file, Database::Access::kWriter);
     as_it_was.execute(
         "DROP INDEX jobs_by_state; CREATE INDEX unfinished_jobs ON jobs (state, sequence) "
-        "WHERE state IN ('queued', 'running'); PRAGMA user_version = 1;");
+        "WHERE state IN ('queued', 'running'); DROP TABLE delivered_instances; DROP TABLE deliveries; DROP "
+        "TABLE arrivals; "
+        "ALTER TABLE jobs DROP COLUMN not_before_ms; ALTER TABLE jobs DROP COLUMN source_tries; "
+        "PRAGMA user_version = 1;");
   }
   StoreDatabase now(file);
   EXPECT_EQ(now.start_number(), 2);

@@ -1,0 +1,84 @@
+#include "service/jobs/arrival_store.h"
+
+#include "service/jobs/ids.h"
+#include "service/jobs/job_store.h"
+
+namespace volsmooth {
+namespace {
+
+std::vector<std::string> texts_of(Statement row) {
+  std::vector<std::string> texts;
+  while (row.step()) texts.push_back(row.text(0));
+  return texts;
+}
+
+}  // namespace
+
+void ArrivalStore::add(std::string_view preset, std::string_view file,
+                       const std::vector<ArrivedInstance>& instances) {
+  database_.write([&](Database& database) {
+    for (const ArrivedInstance& instance : instances)
+      database.run(
+          "INSERT OR IGNORE INTO arrivals (preset, study, series, sop_instance_uid, file, offset, bytes, "
+          "received_ms) "
+          "VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+          preset, instance.study_uid, instance.series_uid, instance.sop_instance_uid, file, instance.offset,
+          instance.bytes, milliseconds_of(now_in_milliseconds()));
+    audit(database, preset, "instances received");
+    return true;
+  });
+}
+
+std::optional<DicomSource> ArrivalStore::quiet_since(const std::string& preset, Time since) {
+  return database_.read([&](Database& database) -> std::optional<DicomSource> {
+    Statement row = database.query(
+        "SELECT study, series FROM arrivals WHERE preset = ? AND job IS NULL "
+        "GROUP BY study, series HAVING max(received_ms) <= ? ORDER BY min(sequence)",
+        preset, milliseconds_of(since));
+    if (!row.step()) return std::nullopt;
+    return DicomSource{"", row.text(0), row.text(1), preset};
+  });
+}
+
+std::vector<ArrivedPart> ArrivalStore::parts_of(std::string_view job_id) {
+  return database_.read([&](Database& database) {
+    Statement row = database.query(
+        "SELECT file, offset, bytes FROM arrivals WHERE job = (SELECT sequence FROM jobs WHERE id = ?) "
+        "ORDER BY sequence",
+        job_id);
+    std::vector<ArrivedPart> parts;
+    while (row.step()) parts.push_back({row.text(0), row.integer(1), row.integer(2)});
+    return parts;
+  });
+}
+
+std::vector<std::string> ArrivalStore::forget(std::string_view job_id) {
+  return database_.write([&](Database& database) {
+    constexpr std::string_view kOfJob = "job = (SELECT sequence FROM jobs WHERE id = ?1)";
+    const std::string of_job(kOfJob);
+    auto files = texts_of(database.query("SELECT DISTINCT file FROM arrivals AS mine WHERE " + of_job +
+                                             " AND NOT EXISTS (SELECT 1 FROM arrivals AS other WHERE "
+                                             "other.file = mine.file AND other.job IS NOT mine.job)",
+                                         job_id));
+    database.run("DELETE FROM arrivals WHERE " + of_job, job_id);
+    return files;
+  });
+}
+
+std::vector<std::string> ArrivalStore::files() {
+  return database_.read(
+      [](Database& database) { return texts_of(database.query("SELECT DISTINCT file FROM arrivals")); });
+}
+
+void hand_over(Database& database, const DicomSource& series, std::string_view job_id) {
+  database.run(
+      "UPDATE arrivals SET job = (SELECT sequence FROM jobs WHERE id = ?1) "
+      "WHERE preset = ?2 AND study = ?3 AND series = ?4 AND job IS NULL",
+      job_id, series.preset, series.study, series.series);
+}
+
+std::string new_arrival_file() {
+  return "arrivals/" + new_id("a-");
+}
+
+}  // namespace volsmooth

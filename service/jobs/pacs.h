@@ -1,0 +1,71 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <span>
+#include <string>
+#include <tl/expected.hpp>
+#include <vector>
+
+#include "algorithms/progress.h"
+#include "service/jobs/job.h"
+#include "service/storage/incoming_file.h"
+
+namespace volsmooth {
+
+/// Why an exchange with a node did not come about.
+struct NodeFailure {
+  Problem problem;
+  bool is_passing = false;  ///< worth another try: the node is down, busy or out of space
+};
+
+/// One DICOM instance among the results of a job.
+struct DicomInstance {
+  std::string sop_class_uid;
+  std::string sop_instance_uid;
+  std::string result;  ///< the name of the result file that holds it
+};
+
+/// What a node says of one instance that it was sent.
+struct InstanceAnswer {
+  std::string sop_instance_uid;
+  bool stored = false;
+  std::string reason;  ///< the node's failure code, when it was refused
+};
+
+/// An order that is run on every series that devices send to it.
+struct Preset {
+  std::string name;
+  JobOrder order;  ///< without its volume
+  /// A series is whole when nothing of it has arrived for so long.
+  std::chrono::milliseconds quiet = std::chrono::seconds(10);
+};
+
+/// The DICOM nodes and presets that the configuration names, handed to the service by main as plain functions
+/// (pacs/pacs.h makes them).
+struct Pacs {
+  struct Node {
+    std::string name;
+    bool gives = false;  ///< series can be retrieved from it
+  };
+  std::vector<Node> nodes;
+  std::vector<Preset> presets;
+
+  /// Retrieves a whole series into `file`, in a form that `Engine::inspect` reads. Checks that all instances
+  /// that the node lists came.
+  std::function<tl::expected<void, NodeFailure>(const DicomSource& source, IncomingFile& file,
+                                                const Progress& report)>
+      retrieve;
+
+  /// The instances that a result file of kind "series" or "dicom" holds.
+  std::function<std::vector<DicomInstance>(const std::filesystem::path& file)> instances_in;
+
+  /// Sends those instances of a result file to a node. `on_answers` gets what the node says of each, as it
+  /// says it; what it throws ends the sending.
+  std::function<tl::expected<void, NodeFailure>(
+      const std::string& node, const std::filesystem::path& file, std::span<const DicomInstance> instances,
+      const std::function<void(std::span<const InstanceAnswer>)>& on_answers)>
+      send;
+};
+
+}  // namespace volsmooth

@@ -1,0 +1,114 @@
+#include "service/jobs/source_runner.h"
+
+#include <spdlog/spdlog.h>
+
+#include <fstream>
+#include <span>
+#include <stdexcept>
+#include <system_error>
+
+#include "service/jobs/arrival_store.h"
+#include "service/jobs/ids.h"
+#include "service/jobs/job_runner.h"
+#include "service/jobs/retry_times.h"
+
+namespace volsmooth {
+namespace {
+
+NodeFailure no_room() {
+  return {{"insufficient-storage", "The disk has too little free space for the series."}, true};
+}
+
+NodeFailure failure_of(const std::exception& thrown) {
+  const auto* error = dynamic_cast<const std::system_error*>(&thrown);
+  if (error && error->code() == std::errc::no_space_on_device) return no_room();
+  return {{"internal", "The series could not be fetched; the fault is the service's, see its log."}, false};
+}
+
+}  // namespace
+
+void SourceRunner::run(ClaimedJob& claim) const {
+  try {
+    auto file = files_.receive();
+    if (!file) return fail_or_wait(claim, no_room());
+    if (auto volume = retrieve(claim, *file)) {
+      keep(claim, *std::move(volume), *std::move(file));
+    } else {
+      fail_or_wait(claim, std::move(volume.error()));
+    }
+  } catch (const Cancelled&) {
+    claim.end_interrupted();
+  } catch (const std::exception& thrown) {
+    spdlog::error("job {} attempt {}: {}", claim.job().id, claim.job().attempt, thrown.what());
+    fail_or_wait(claim, failure_of(thrown));
+  }
+}
+
+tl::expected<StoredVolume, NodeFailure> SourceRunner::retrieve(ClaimedJob& claim, IncomingFile& file) const {
+  const DicomSource& source = claim.job().order.source.value();
+  RunningJob& running = claim.running();
+  const Progress report = [&](double fraction) {
+    if (running.report("retrieve", fraction)) wake_(claim.job().id);
+  };
+  report(0);
+  if (!source.preset.empty()) {
+    assemble(claim, file, report);
+  } else if (auto came = pacs_.retrieve(source, file, report); !came) {
+    return tl::unexpected(std::move(came.error()));
+  }
+
+  StoredVolume volume;
+  volume.id = new_id("v-");
+  volume.options.series = source.series;
+  volume.sha256 = file.finish();
+  volume.bytes = file.bytes();
+  volume.created_at = now_in_milliseconds();
+  auto facts = engine_.inspect(file.path(), volume.options, [&](double) { running.throw_if_interrupted(); });
+  if (!facts) return tl::unexpected(NodeFailure{std::move(facts.error()), false});
+  volume.facts = *std::move(facts);
+  return volume;
+}
+
+/// Puts what has arrived into one multipart body.
+void SourceRunner::assemble(ClaimedJob& claim, IncomingFile& file, const Progress& report) const {
+  const std::string boundary = "volsmooth-" + new_id("");
+  const auto write = [&](const std::string& text) { file.write(std::as_bytes(std::span(text))); };
+  const auto parts = ArrivalStore(database_).parts_of(claim.job().id);
+  for (std::size_t part = 0; part < parts.size(); ++part) {
+    report(static_cast<double>(part) / static_cast<double>(parts.size()));
+    const auto& [name, offset, bytes] = parts[part];
+    write("--" + boundary + "\r\nContent-Type: application/dicom\r\n\r\n");
+    std::string content(static_cast<std::size_t>(bytes), '\0');
+    std::ifstream in(files_.path_of(name), std::ios::binary);
+    in.seekg(offset);
+    if (!in.read(content.data(), bytes)) throw std::runtime_error("an arrived file cannot be read");
+    write(content);
+    write("\r\n");
+  }
+  write("--" + boundary + "--\r\n");
+}
+
+void SourceRunner::keep(ClaimedJob& claim, StoredVolume volume, IncomingFile file) const {
+  auto plan = engine_.plan(claim.job().order, volume.facts);
+  if (!plan) return claim.fail(std::move(plan.error()));
+  const std::string place = volume_file(volume.id);
+  files_.adopt(std::move(file), place);
+  bool taken = false;
+  try {
+    taken = claim.continue_with({std::move(volume), *std::move(plan)});
+  } catch (...) {
+    if (!database_.condemned()) files_.remove(place);
+    throw;
+  }
+  if (!taken) files_.remove(place);
+}
+
+void SourceRunner::fail_or_wait(ClaimedJob& claim, NodeFailure failure) const {
+  const Time now = now_in_milliseconds();
+  if (!failure.is_passing || now - claim.job().created_at > settings_.node_patience)
+    return claim.fail(std::move(failure.problem));
+  claim.wait_until(now + pause_after(claim.job().source_tries, settings_.longest_node_pause),
+                   std::move(failure.problem));
+}
+
+}  // namespace volsmooth

@@ -1,0 +1,72 @@
+#include "service/pacs/nodes.h"
+
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+
+#include "service/jobs/ids.h"
+
+namespace volsmooth {
+namespace {
+
+using nlohmann::json;
+
+[[noreturn]] void fail(const std::string& name, const std::string& what) {
+  throw std::runtime_error("configuration, node '" + name + "': " + what);
+}
+
+std::string text_in(const json& node, const std::string& name, const char* member) {
+  const auto found = node.find(member);
+  if (found == node.end()) return {};
+  if (!found->is_string()) fail(name, std::string("'") + member + "' must be text");
+  return found->get<std::string>();
+}
+
+std::string credentials_from(const std::string& name, const std::filesystem::path& file) {
+  struct stat facts {};
+  if (::stat(file.c_str(), &facts) != 0) fail(name, "'credentials_file' cannot be read");
+  if ((facts.st_mode & (S_IRWXG | S_IRWXO)) != 0)
+    fail(name, "'credentials_file' must be its owner's alone; run: chmod 600 on it");
+  std::ifstream in(file);
+  std::string line;
+  if (!std::getline(in, line) || line.empty())
+    fail(name, "'credentials_file' must hold one line, user:password or a token");
+  if (std::ranges::any_of(line, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7F; }))
+    fail(name, "'credentials_file' holds control characters");
+  return line;
+}
+
+Node node_from(const std::string& name, const json& configured) {
+  if (!is_id_shaped(name)) fail(name, "a name has 1 to 64 letters, digits, '-' and '_'");
+  if (!configured.is_object()) fail(name, "must be an object with 'dicomweb'");
+  for (const auto& [member, value] : configured.items())
+    if (member != "dicomweb" && member != "credentials_file")
+      fail(name, "'" + member + "' is not known; known are dicomweb and credentials_file");
+
+  Node node{name, text_in(configured, name, "dicomweb"), {}, {}};
+  if (!node.url.starts_with("http://") && !node.url.starts_with("https://"))
+    fail(name, "'dicomweb' must be an http:// or https:// address");
+  if (node.url.find_first_of(" ?#") != std::string::npos)
+    fail(name, "'dicomweb' must be an address without a query");
+  while (node.url.ends_with('/')) node.url.pop_back();
+  if (const std::string file = text_in(configured, name, "credentials_file"); !file.empty()) {
+    std::string credentials = credentials_from(name, file);
+    (credentials.find(':') == std::string::npos ? node.token : node.login) = std::move(credentials);
+  }
+  return node;
+}
+
+}  // namespace
+
+std::vector<Node> nodes_from(const json& configured) {
+  if (!configured.is_object())
+    throw std::runtime_error("configuration: 'nodes' must be an object of names and nodes");
+  std::vector<Node> nodes;
+  for (const auto& [name, node] : configured.items()) nodes.push_back(node_from(name, node));
+  return nodes;
+}
+
+}  // namespace volsmooth

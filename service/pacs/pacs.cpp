@@ -1,0 +1,41 @@
+#include "service/pacs/pacs.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "service/pacs/instances.h"
+#include "service/pacs/retrieval.h"
+#include "service/pacs/sending.h"
+
+namespace volsmooth {
+
+Pacs make_pacs(std::vector<Node> nodes, std::vector<Preset> presets, std::int64_t max_bytes) {
+  Pacs pacs;
+  pacs.presets = std::move(presets);
+  for (const Node& node : nodes) pacs.nodes.push_back({node.name, true});
+  // A job that was accepted under another configuration may name a node that is not there any more.
+  const auto find = [nodes = std::move(nodes)](const std::string& name) -> tl::expected<Node, NodeFailure> {
+    const auto found = std::ranges::find(nodes, name, &Node::name);
+    if (found != nodes.end()) return *found;
+    return tl::unexpected(NodeFailure{
+        {"node-unreachable", "The configuration has no such node any more.", {{"node", name}}}, true});
+  };
+  pacs.retrieve = [find, max_bytes](const DicomSource& source, IncomingFile& file, const Progress& report) {
+    return find(source.node).and_then([&](const Node& node) {
+      return retrieve_series(node, source, file, max_bytes, report);
+    });
+  };
+  pacs.instances_in = [](const std::filesystem::path& file) {
+    std::vector<DicomInstance> instances;
+    for_each_instance(file, [&](const DicomInstance& instance, auto) { instances.push_back(instance); });
+    return instances;
+  };
+  pacs.send = [find](const std::string& name, const std::filesystem::path& file,
+                     std::span<const DicomInstance> instances, const auto& on_answers) {
+    return find(name).and_then(
+        [&](const Node& node) { return send_instances(node, file, instances, on_answers); });
+  };
+  return pacs;
+}
+
+}  // namespace volsmooth

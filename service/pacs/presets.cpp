@@ -1,0 +1,63 @@
+#include "service/pacs/presets.h"
+
+#include <stdexcept>
+
+#include "service/jobs/ids.h"
+#include "service/jobs/job_json.h"
+
+namespace volsmooth {
+namespace {
+
+using nlohmann::json;
+
+[[noreturn]] void fail(const std::string& name, const std::string& what) {
+  throw std::runtime_error("configuration, preset '" + name + "': " + what);
+}
+
+JobOrder order_in(const std::string& name, json job) {
+  if (!job.is_object()) fail(name, "'job' must be an order without a volume, such as {}");
+  for (const char* member : {"volume", "source", "destination"})
+    if (job.contains(member)) fail(name, std::string("'job' must be without '") + member + "'");
+  if (!job.contains("outputs")) job["outputs"] = {"dicom-series"};
+  job["volume"] = "v-0";
+  auto order = order_from(job);
+  if (!order) fail(name, order.error().detail);
+  order->volume.clear();
+  return *std::move(order);
+}
+
+std::chrono::milliseconds quiet_in(const std::string& name, const json& seconds) {
+  constexpr double kLongest = 3600;
+  if (!seconds.is_number() || !(seconds.get<double>() > 0 && seconds.get<double>() <= kLongest))
+    fail(name, "'quiet_seconds' must be a number above 0, at most 3600");
+  return std::chrono::milliseconds(static_cast<std::int64_t>(1000 * seconds.get<double>()));
+}
+
+Preset preset_from(const std::string& name, const json& configured) {
+  if (!is_id_shaped(name)) fail(name, "a name has 1 to 64 letters, digits, '-' and '_'");
+  if (!configured.is_object()) fail(name, "must be an object with 'job' and 'destination'");
+  Preset preset{name, order_in(name, configured.value("job", json::object()))};
+  for (const auto& [member, value] : configured.items()) {
+    if (member == "destination") {
+      if (!value.is_string()) fail(name, "'destination' must be the name of a node");
+      preset.order.destination = value;
+    } else if (member == "quiet_seconds") {
+      preset.quiet = quiet_in(name, value);
+    } else if (member != "job") {
+      fail(name, "'" + member + "' is not known; known are job, destination and quiet_seconds");
+    }
+  }
+  return preset;
+}
+
+}  // namespace
+
+std::vector<Preset> presets_from(const json& configured) {
+  if (!configured.is_object())
+    throw std::runtime_error("configuration: 'presets' must be an object of names and presets");
+  std::vector<Preset> presets;
+  for (const auto& [name, preset] : configured.items()) presets.push_back(preset_from(name, preset));
+  return presets;
+}
+
+}  // namespace volsmooth

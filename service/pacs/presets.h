@@ -1,0 +1,15 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "service/jobs/pacs.h"
+
+namespace volsmooth {
+
+/// Reads the member "presets" of the configuration: `{name: {"job": order without volume, "destination":
+/// node, "quiet_seconds": 10}}`. Without outputs in the order, its result is a derived series. Throws
+/// std::runtime_error with what is wrong and where.
+std::vector<Preset> presets_from(const nlohmann::json& configured);
+
+}  // namespace volsmooth

@@ -1,0 +1,397 @@
+#include "service/jobs/pacs.h"
+
+#include <gmock/gmock.h>
+
+#include <map>
+
+#include "tests/service/jobs/service_fixture.h"
+
+namespace volsmooth {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+/// A node that does what the test says: is down, has a series, refuses instances.
+struct FakeNode {
+  std::atomic<bool> up = true, has_series = true;
+  std::atomic<int> asked = 0;
+  std::mutex mutex;
+  std::vector<std::string> received;
+  std::string refuses;
+
+  static NodeFailure down() { return {{"node-unreachable", "It is down."}, true}; }
+
+  Pacs pacs() {
+    Pacs pacs;
+    pacs.nodes = {{"archive", true}, {"printer", false}};
+    pacs.retrieve = [this](const DicomSource&, IncomingFile& file,
+                           const Progress& report) -> tl::expected<void, NodeFailure> {
+      ++asked;
+      report(0.5);
+      if (!up) return tl::unexpected(down());
+      if (!has_series) return tl::unexpected(NodeFailure{{"source-not-found", "Not there."}, false});
+      const std::string series = "series";
+      file.write(std::as_bytes(std::span(series)));
+      return {};
+    };
+    pacs.instances_in = [](const std::filesystem::path& file) {
+      const std::string stem = file.filename();
+      return std::vector<DicomInstance>{{"1.2", stem + ".1", {}}, {"1.2", stem + ".2", {}}};
+    };
+    pacs.send = [this](const std::string&, const std::filesystem::path&,
+                       std::span<const DicomInstance> instances,
+                       const auto& on_answers) -> tl::expected<void, NodeFailure> {
+      ++asked;
+      for (const DicomInstance& instance : instances) {
+        if (!up) return tl::unexpected(down());
+        const bool stored = instance.sop_instance_uid != refuses;
+        {
+          const std::lock_guard lock(mutex);
+          received.push_back(instance.sop_instance_uid);
+        }
+        const std::vector<InstanceAnswer> answers = {
+            {instance.sop_instance_uid, stored, stored ? "" : "0xA700"}};
+        on_answers(answers);
+        if (go_down_after_each) up = false;
+      }
+      return {};
+    };
+    return pacs;
+  }
+  std::atomic<bool> go_down_after_each = false;
+};
+
+class PacsJobs : public JobServiceTest {
+ protected:
+  void open() {
+    auto engine = fake_.engine();
+    engine.compute = [this](const ComputeTask& task,
+                            const StageProgress&) -> tl::expected<std::vector<Result>, Problem> {
+      seen_volume_ = task.order.volume;
+      std::ofstream(task.output_dir / "out.zip") << "x";
+      std::ofstream(task.output_dir / "report.json") << "{}";
+      return std::vector<Result>{FakeEngine::result("out.zip", "series"),
+                                 FakeEngine::result("report.json", "report")};
+    };
+    JobServiceSettings given = settings();
+    given.longest_node_pause = 20ms;
+    given.node_patience = patience_;
+    service_ = std::make_unique<JobService>(given, engine, node_.pacs());
+    service_->start();
+  }
+
+  static JobOrder source_order() {
+    JobOrder order;
+    order.source = DicomSource{"archive", "1.2.3", "1.2.3.4"};
+    return order;
+  }
+  JobOrder delivery_order() {
+    JobOrder order = order_for(upload(*service_, "series").value().id);
+    order.outputs = {"dicom-series"};
+    order.destination = "printer";
+    return order;
+  }
+  /// The job once its delivery is in `state`.
+  Job delivered(const std::string& id, DeliveryState state) {
+    for (int tries = 0; tries < 6000; ++tries) {
+      Job job = service_->job(id).value();
+      if (job.delivery && job.delivery->state == state) return job;
+      std::this_thread::sleep_for(10ms);
+    }
+    throw std::runtime_error("the delivery did not get there");
+  }
+
+  FakeNode node_;
+  std::chrono::milliseconds patience_ = 1h;
+  std::string seen_volume_;
+};
+
+TEST_F(PacsJobs, ASeriesIsFetchedAndThenComputedOn) {
+  open();
+  const Job queued = service_->submit(source_order()).value();
+  EXPECT_EQ(queued.order.volume, "");
+  const Job done = wait_for(*service_, queued.id);
+  EXPECT_EQ(done.state, JobState::kSucceeded);
+  ASSERT_EQ(service_->volumes().size(), 1U);
+  EXPECT_EQ(service_->volumes()[0].options.series, "1.2.3.4");
+  EXPECT_EQ(done.order.volume, service_->volumes()[0].id);
+  EXPECT_EQ(seen_volume_, done.order.volume);
+  EXPECT_EQ(done.order.source->study, "1.2.3");
+  EXPECT_EQ(node_.asked, 1);
+}
+
+TEST_F(PacsJobs, AJobWaitsForASourceThatIsDown) {
+  node_.up = false;
+  open();
+  const std::string id = service_->submit(source_order()).value().id;
+  Job waiting;
+  while (waiting.source_tries < 2) waiting = service_->job(id).value();
+  EXPECT_EQ(waiting.progress.stage == "retrieve" || waiting.error->slug == "node-unreachable", true);
+  node_.up = true;
+  EXPECT_EQ(wait_for(*service_, id).state, JobState::kSucceeded);
+  EXPECT_FALSE(service_->job(id)->error);
+}
+
+TEST_F(PacsJobs, AWaitingJobSaysWhyAndUntilWhen) {
+  node_.up = false;
+  open();
+  const std::string id = service_->submit(source_order()).value().id;
+  for (;;) {
+    const Job job = service_->job(id).value();
+    if (job.progress.stage != "waiting-for-source") continue;
+    EXPECT_EQ(job.state, JobState::kQueued);
+    EXPECT_EQ(job.error->slug, "node-unreachable");
+    EXPECT_TRUE(job.next_attempt_at);
+    break;
+  }
+  ASSERT_TRUE(service_->cancel(id));  // it may just be asking again
+  EXPECT_EQ(wait_for(*service_, id).state, JobState::kCancelled);
+  EXPECT_TRUE(service_->volumes().empty());
+}
+
+TEST_F(PacsJobs, WaitingSurvivesARestart) {
+  node_.up = false;
+  open();
+  const std::string id = service_->submit(source_order()).value().id;
+  while (service_->job(id)->source_tries < 1) std::this_thread::sleep_for(1ms);
+  service_.reset();
+  node_.up = true;
+  open();
+  EXPECT_EQ(wait_for(*service_, id).state, JobState::kSucceeded);
+}
+
+TEST_F(PacsJobs, PatienceEnds) {
+  node_.up = false;
+  patience_ = 50ms;
+  open();
+  const Job failed = wait_for(*service_, service_->submit(source_order()).value().id);
+  EXPECT_EQ(failed.state, JobState::kFailed);
+  EXPECT_EQ(failed.error->slug, "node-unreachable");
+}
+
+TEST_F(PacsJobs, AMissingSeriesIsNotAskedForAgain) {
+  node_.has_series = false;
+  open();
+  const Job failed = wait_for(*service_, service_->submit(source_order()).value().id);
+  EXPECT_EQ(failed.error->slug, "source-not-found");
+  EXPECT_EQ(node_.asked, 1);
+}
+
+TEST_F(PacsJobs, BadOrdersAreRefused) {
+  open();
+  const std::string volume = upload(*service_, "series").value().id;
+  const auto refused = [&](const auto& change, const std::string& text) {
+    JobOrder order = order_for(volume);
+    change(order);
+    const auto answer = service_->submit(order);
+    ASSERT_FALSE(answer) << text;
+    EXPECT_EQ(answer.error().slug, "bad-parameter");
+    EXPECT_THAT(answer.error().detail, HasSubstr(text));
+  };
+  refused([](JobOrder& order) { order.source = source_order().source; }, "without 'volume'");
+  refused(
+      [](JobOrder& order) {
+        order = source_order();
+        order.source->node = "printer";
+      },
+      "'source' must name a node");
+  refused([](JobOrder& order) { order.destination = "archive"; }, "DICOM objects only");
+  refused(
+      [](JobOrder& order) {
+        order.destination = "nobody";
+        order.outputs = {"dicom-series"};
+      },
+      "'destination' must name a node");
+}
+
+TEST_F(PacsJobs, ResultsGoToTheDestinationOnce) {
+  open();
+  const std::string id = service_->submit(delivery_order()).value().id;
+  const Job job = delivered(id, DeliveryState::kDelivered);
+  EXPECT_EQ(job.state, JobState::kSucceeded);
+  EXPECT_EQ(job.delivery->instances, 2);
+  EXPECT_EQ(job.delivery->stored, 2);
+  EXPECT_THAT(node_.received, ElementsAre("out.zip.1", "out.zip.2"));
+}
+
+/// The node dies after every instance: none is lost, none is sent twice.
+TEST_F(PacsJobs, OnlyWhatIsMissingIsSentAgain) {
+  node_.go_down_after_each = true;
+  open();
+  const std::string id = service_->submit(delivery_order()).value().id;
+  while (true) {
+    const Job job = service_->job(id).value();
+    if (job.delivery && job.delivery->state == DeliveryState::kDelivered) break;
+    EXPECT_TRUE(!job.delivery || job.delivery->tries == 0 || job.delivery->error->slug == "node-unreachable");
+    std::this_thread::sleep_for(5ms);
+    node_.up = true;
+  }
+  EXPECT_THAT(node_.received, ElementsAre("out.zip.1", "out.zip.2"));
+}
+
+TEST_F(PacsJobs, DeliveryGoesOnAfterARestart) {
+  node_.up = false;
+  open();
+  const std::string id = service_->submit(delivery_order()).value().id;
+  while (!service_->job(id)->delivery || service_->job(id)->delivery->tries == 0)
+    std::this_thread::sleep_for(1ms);
+  service_.reset();
+  node_.up = true;
+  open();
+  EXPECT_EQ(delivered(id, DeliveryState::kDelivered).delivery->stored, 2);
+}
+
+TEST_F(PacsJobs, ARefusedInstanceFailsTheDeliveryNotTheJob) {
+  node_.refuses = "out.zip.2";
+  open();
+  const std::string id = service_->submit(delivery_order()).value().id;
+  const Job job = delivered(id, DeliveryState::kFailed);
+  EXPECT_EQ(job.state, JobState::kSucceeded);
+  EXPECT_EQ(job.delivery->error->slug, "delivery-refused");
+  EXPECT_EQ(job.delivery->stored, 1);
+  EXPECT_EQ(job.delivery->refused, 1);
+  const auto ledger = service_->ledger(id).value();
+  ASSERT_EQ(ledger.size(), 2U);
+  EXPECT_EQ(ledger[0].state, "stored");
+  EXPECT_EQ(ledger[1].state, "refused");
+  EXPECT_EQ(ledger[1].reason, "0xA700");
+  EXPECT_EQ(ledger[1].instance.result, "out.zip");
+
+  node_.refuses = "";
+  service_->deliver_again(id).value();
+  EXPECT_EQ(delivered(id, DeliveryState::kDelivered).delivery->stored, 2);
+  EXPECT_THAT(node_.received, ElementsAre("out.zip.1", "out.zip.2", "out.zip.2"));
+}
+
+TEST_F(PacsJobs, AJobWithoutDestinationHasAnEmptyLedger) {
+  open();
+  const auto volume = upload(*service_, "series").value();
+  const Job done = wait_for(*service_, service_->submit(order_for(volume.id)).value().id);
+  EXPECT_FALSE(done.delivery);
+  EXPECT_TRUE(service_->ledger(done.id)->empty());
+  EXPECT_FALSE(service_->deliver_again(done.id)->delivery);
+  EXPECT_EQ(slug_of(service_->ledger("j-aaaaaaaaaaaaaaaa")), "not-found");
+  EXPECT_EQ(slug_of(service_->deliver_again("j-aaaaaaaaaaaaaaaa")), "not-found");
+}
+
+TEST_F(PacsJobs, ADeletedJobIsNotDelivered) {
+  node_.up = false;
+  open();
+  const std::string id = service_->submit(delivery_order()).value().id;
+  while (!service_->job(id)->delivery || service_->job(id)->delivery->tries == 0)
+    std::this_thread::sleep_for(1ms);
+  ASSERT_TRUE(service_->delete_job(id));
+  node_.up = true;
+  std::this_thread::sleep_for(100ms);
+  EXPECT_TRUE(node_.received.empty());
+}
+
+/// Instances of the series "1.2.3.<digit>", one a digit of the file.
+tl::expected<std::vector<ArrivedInstance>, Problem> instances_of_digits(const std::filesystem::path& file) {
+  std::ifstream in(file);
+  std::string text;
+  in >> text;
+  if (text == "bad") return tl::unexpected(Problem{"dicom-no-images", "None."});
+  std::vector<ArrivedInstance> instances;
+  for (std::size_t at = 0; at < text.size(); ++at)
+    instances.push_back({"1.2", "9." + text + "." + std::to_string(at), "1.2.3",
+                         std::string("1.2.3.") + text[at], static_cast<std::int64_t>(at), 1});
+  return instances;
+}
+
+class PresetJobs : public JobServiceTest {
+ protected:
+  void open(std::chrono::milliseconds quiet = 1ms) {
+    auto engine = fake_.engine();
+    engine.instances = instances_of_digits;
+    Pacs pacs;
+    pacs.presets = {{"head", JobOrder{}, quiet}};
+    pacs.presets[0].order.label = "sent";
+    service_ = std::make_unique<JobService>(settings(), engine, pacs);
+    service_->start();
+  }
+
+  auto send(const std::string& text, const std::string& preset = "head") {
+    auto file = service_->begin_upload({}).value();
+    file.write(std::as_bytes(std::span(text)));
+    return service_->receive(preset, std::move(file));
+  }
+
+  std::vector<Job> jobs_once_there_are(std::size_t count) {
+    for (int tries = 0; tries < 6000; ++tries) {
+      auto page = service_->jobs({}).value();
+      if (page.jobs.size() == count) return page.jobs;
+      std::this_thread::sleep_for(10ms);
+    }
+    throw std::runtime_error("the jobs did not come");
+  }
+  std::ptrdiff_t arrived_files() {
+    const auto folder = scratch_.path() / "data" / "arrivals";
+    if (!std::filesystem::exists(folder)) return 0;
+    return std::distance(std::filesystem::directory_iterator(folder), {});
+  }
+};
+
+TEST_F(PresetJobs, WhatArrivesInPiecesBecomesOneJobASeries) {
+  open(300ms);
+  for (const char* text : {"1", "2", "11", "21"}) ASSERT_TRUE(send(text));
+  for (const Job& job : jobs_once_there_are(2)) {
+    const Job done = wait_for(*service_, job.id);
+    EXPECT_EQ(done.state, JobState::kSucceeded);
+    EXPECT_EQ(done.order.label, "sent");
+    EXPECT_EQ(done.order.source->preset, "head");
+    std::ifstream in(service_->volume_content(done.order.volume)->path);
+    const std::string body((std::istreambuf_iterator<char>(in)), {});
+    const std::string digit = done.order.source->series.substr(6);
+    std::size_t parts = 0;
+    for (std::size_t at = 0; (at = body.find("\r\n\r\n" + digit + "\r\n--", at)) != std::string::npos; ++at)
+      ++parts;
+    EXPECT_EQ(parts, digit == "1" ? 4U : 2U) << body;
+  }
+  EXPECT_EQ(arrived_files(), 0);
+}
+
+TEST_F(PresetJobs, WhatIsSentAgainIsTakenOnce) {
+  open(300ms);
+  for (int time = 0; time < 3; ++time) ASSERT_TRUE(send("1"));
+  const Job done = wait_for(*service_, jobs_once_there_are(1)[0].id);
+  std::ifstream in(service_->volume_content(done.order.volume)->path);
+  const std::string body((std::istreambuf_iterator<char>(in)), {});
+  EXPECT_EQ(body.find("Content-Type"), body.rfind("Content-Type"));
+}
+
+TEST_F(PresetJobs, ArrivalsSurviveARestart) {
+  open(1h);
+  ASSERT_TRUE(send("1"));
+  service_.reset();
+  EXPECT_EQ(arrived_files(), 1);
+  open();
+  EXPECT_EQ(wait_for(*service_, jobs_once_there_are(1)[0].id).state, JobState::kSucceeded);
+}
+
+TEST_F(PresetJobs, RefusesWhatIsNoDicomAndUnknownPresets) {
+  open();
+  EXPECT_EQ(slug_of(send("bad")), "dicom-no-images");
+  EXPECT_EQ(slug_of(send("1", "foot")), "not-found");
+  EXPECT_EQ(arrived_files(), 0);
+  EXPECT_TRUE(service_->jobs({})->jobs.empty());
+}
+
+TEST_F(PresetJobs, AnOrderOfAClientCannotNameAPreset) {
+  open();
+  JobOrder order;
+  order.source = DicomSource{"", "1.2.3", "1.2.3.1", "head"};
+  EXPECT_EQ(slug_of(service_->submit(order)), "bad-parameter");
+}
+
+TEST_F(PresetJobs, APresetThatCannotRunStopsTheStart) {
+  Pacs pacs;
+  pacs.presets = {{"head", JobOrder{}}};
+  pacs.presets[0].order.method = "magic";
+  EXPECT_THROW(JobService(settings(), fake_.engine(), pacs), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace volsmooth

@@ -1,0 +1,76 @@
+#include "service/pacs/nodes.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <fstream>
+
+#include "tests/support/scratch_folder.h"
+
+namespace volsmooth {
+namespace {
+
+using nlohmann::json;
+
+class Nodes : public testing::Test {
+ protected:
+  std::string file_with(const std::string& text, mode_t mode = 0600) {
+    const auto path = scratch_.path() / "credentials";
+    std::ofstream(path) << text;
+    ::chmod(path.c_str(), mode);
+    return path;
+  }
+  ScratchFolder scratch_;
+};
+
+TEST_F(Nodes, AreReadByName) {
+  const auto nodes = nodes_from(json{{"pacs", {{"dicomweb", "https://pacs.example/dicom-web/"}}}});
+  ASSERT_EQ(nodes.size(), 1U);
+  EXPECT_EQ(nodes[0].name, "pacs");
+  EXPECT_EQ(nodes[0].url, "https://pacs.example/dicom-web");
+  EXPECT_EQ(nodes[0].login + nodes[0].token, "");
+}
+
+TEST_F(Nodes, CredentialsAreALoginOrAToken) {
+  const json login = {{"p", {{"dicomweb", "http://p"}, {"credentials_file", file_with("me:secret:x\n")}}}};
+  EXPECT_EQ(nodes_from(login)[0].login, "me:secret:x");
+  const json token = {{"p", {{"dicomweb", "http://p"}, {"credentials_file", file_with("abc.def\n")}}}};
+  EXPECT_EQ(nodes_from(token)[0].token, "abc.def");
+}
+
+TEST_F(Nodes, WhatIsWrongIsRefusedWithItsPlace) {
+  const std::vector<std::pair<json, std::string>> table = {
+      {json::array(), "'nodes' must be an object"},
+      {{{"a b", {{"dicomweb", "http://p"}}}}, "a name has"},
+      {{{"p", "http://p"}}, "must be an object with 'dicomweb'"},
+      {{{"p", json::object()}}, "'dicomweb' must be an http"},
+      {{{"p", {{"dicomweb", 5}}}}, "'dicomweb' must be text"},
+      {{{"p", {{"dicomweb", "file:///etc"}}}}, "'dicomweb' must be an http"},
+      {{{"p", {{"dicomweb", "http://p?x=1"}}}}, "without a query"},
+      {{{"p", {{"dicomweb", "http://p"}, {"tls", true}}}}, "'tls' is not known"},
+      {{{"p", {{"dicomweb", "http://p"}, {"credentials_file", "/nowhere"}}}}, "cannot be read"},
+      {{{"p", {{"dicomweb", "http://p"}, {"credentials_file", file_with("t", 0640)}}}}, "owner's alone"},
+  };
+  for (const auto& [configured, expected] : table) {
+    try {
+      nodes_from(configured);
+      ADD_FAILURE() << configured << " was taken";
+    } catch (const std::runtime_error& error) {
+      EXPECT_THAT(error.what(), testing::HasSubstr(expected)) << configured;
+    }
+  }
+}
+
+TEST_F(Nodes, SecretsAreNotEchoed) {
+  const json bad = {{"p", {{"dicomweb", "http://p"}, {"credentials_file", file_with("to\x01ken\n")}}}};
+  try {
+    nodes_from(bad);
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), testing::Not(testing::HasSubstr("ken")));
+  }
+}
+
+}  // namespace
+}  // namespace volsmooth
