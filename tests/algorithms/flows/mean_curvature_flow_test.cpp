@@ -61,7 +61,7 @@ TEST_P(NestedSpheres, ComeBackOnTheExactFoliation) {
 }
 
 /// 1.3 x the measured 0.37, 0.79, 2.00 and 3.82 %.
-INSTANTIATE_TEST_SUITE_P(Issue, NestedSpheres,
+INSTANTIATE_TEST_SUITE_P(Spacings, NestedSpheres,
                          testing::Values(Phantom{{1, 1, 1}, 4, 0.0048}, Phantom{{1, 1, 2.5}, 4, 0.0103},
                                          Phantom{{1, 1, 1}, 25, 0.026}, Phantom{{1, 1, 2.5}, 25, 0.0497},
                                          Phantom{{2.5, 1, 1}, 4, 0.0103}, Phantom{{1, 2.5, 1}, 4, 0.0103}));
