@@ -124,6 +124,16 @@ bool needs_zip64(const ZipHeader& entry) {
   return entry.header_offset >= kIn64;
 }
 
+/// What an entry's own header and its record in the directory both have, in this order.
+void read_shared_fields(LittleEndianReader& in, ZipHeader& header) {
+  header.flags = in.number<std::uint16_t>();
+  header.method = in.number<std::uint16_t>();
+  in.skip(4);  // time and date
+  header.crc = in.number<std::uint32_t>();
+  header.packed_size = in.number<std::uint32_t>();
+  header.size = in.number<std::uint32_t>();
+}
+
 }  // namespace
 
 std::optional<ZipHeader> local_header(std::span<const std::byte> bytes) {
@@ -131,12 +141,7 @@ std::optional<ZipHeader> local_header(std::span<const std::byte> bytes) {
   ZipHeader header;
   if (in.number<std::uint32_t>() != kLocalSignature) return std::nullopt;
   in.skip(2);  // version
-  header.flags = in.number<std::uint16_t>();
-  header.method = in.number<std::uint16_t>();
-  in.skip(4);  // time and date
-  header.crc = in.number<std::uint32_t>();
-  header.packed_size = in.number<std::uint32_t>();
-  header.size = in.number<std::uint32_t>();
+  read_shared_fields(in, header);
   const auto name_length = in.number<std::uint16_t>(), extra_length = in.number<std::uint16_t>();
   header.name = in.text(name_length);
   const auto extra = in.bytes(extra_length);
@@ -153,12 +158,7 @@ std::optional<ZipHeader> directory_record(std::span<const std::byte> bytes) {
   ZipHeader header;
   if (in.number<std::uint32_t>() != kDirectorySignature) return std::nullopt;
   in.skip(4);  // versions
-  header.flags = in.number<std::uint16_t>();
-  header.method = in.number<std::uint16_t>();
-  in.skip(4);  // time and date
-  header.crc = in.number<std::uint32_t>();
-  header.packed_size = in.number<std::uint32_t>();
-  header.size = in.number<std::uint32_t>();
+  read_shared_fields(in, header);
   const auto name_length = in.number<std::uint16_t>(), extra_length = in.number<std::uint16_t>(),
              comment_length = in.number<std::uint16_t>();
   const auto disk = in.number<std::uint16_t>();
