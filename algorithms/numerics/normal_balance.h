@@ -11,15 +11,8 @@ template <class Scalar, class Metric, class Rho>
 VOLSMOOTH_FORMULA BalancedMove<Scalar> normal_balanced(const Rho& rho, const Metric& metric, Scalar constant,
                                                        Scalar time) {
   const Scalar here = rho(VoxelOffset{0, 0, 0});
-  FaceCentredRate<Scalar> rate{.speed = 0, .gradient = 0, .lowest = here, .highest = here};
   Neighbours<Scalar> gains;
-  unrolled<3>([&](auto e) VOLSMOOTH_INLINE {
-    const Scalar before = rho(moved_along({0, 0, 0}, e, -1)), after = rho(moved_along({0, 0, 0}, e, 1));
-    rate.include(before);
-    rate.include(after);
-    gains.before[e] = before - here;
-    gains.after[e] = after - here;
-  });
+  FaceCentredRate<Scalar> rate = range_and_gains(rho, here, gains);
   const Scalar direction = constant < Scalar{0} ? Scalar{1} : Scalar{-1};
   rate.gradient = upwind_gradient<UpwindGradient::kGodunov>(direction, gains, metric);
   return balanced(here, rate, constant, time);
