@@ -68,7 +68,7 @@ struct ServiceStatistics {
 struct LedgerEntry {
   DicomInstance instance;
   std::string state;   ///< "pending", "stored" or "refused"
-  std::string reason;  ///< the node's, of one that it refused
+  std::string reason;  ///< the node's, of one that it refused or stored with a warning
 };
 
 /// The rules of uploads and jobs: everything the outside can ask for, durable before it is answered.

@@ -30,7 +30,7 @@ struct DicomInstance {
 struct InstanceAnswer {
   std::string sop_instance_uid;
   bool stored = false;
-  std::string reason;  ///< the node's failure code, when it was refused
+  std::string reason;  ///< the node's code, when it was refused or stored with a warning
 };
 
 /// An order that is run on every series that devices send to it.

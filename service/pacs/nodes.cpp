@@ -8,11 +8,15 @@
 #include <stdexcept>
 
 #include "service/jobs/ids.h"
+#include "service/pacs/ae_title.h"
 
 namespace volsmooth {
 namespace {
 
 using nlohmann::json;
+
+constexpr std::size_t kLongestHost = 253;
+constexpr int kHighestPort = 65535;
 
 [[noreturn]] void fail(const std::string& name, const std::string& what) {
   throw std::runtime_error("configuration, node '" + name + "': " + what);
@@ -39,14 +43,49 @@ std::string credentials_from(const std::string& name, const std::filesystem::pat
   return line;
 }
 
+/// Any other member is a mistake.
+void know(const json& object, const std::string& name, std::initializer_list<std::string_view> known) {
+  for (const auto& [member, value] : object.items()) {
+    if (std::ranges::find(known, member) != known.end()) continue;
+    std::string list;
+    for (const std::string_view one : known) list += (list.empty() ? "" : ", ") + std::string(one);
+    fail(name, "'" + member + "' is not known; known are " + list);
+  }
+}
+
+std::string ae_title_in(const json& peer, const std::string& name, const char* member) {
+  std::string title = text_in(peer, name, member);
+  if (!is_ae_title(title)) fail(name, std::string("'") + member + "' must be " + kAeTitleRule);
+  return title;
+}
+
+DimsePeer peer_from(const std::string& name, const json& configured) {
+  if (!configured.is_object()) fail(name, "'dimse' must be an object with 'host', 'port' and 'aet'");
+  know(configured, name, {"host", "port", "aet", "calling_aet"});
+  DimsePeer peer{text_in(configured, name, "host"), 0, ae_title_in(configured, name, "aet"), kOurAeTitle};
+  const auto of_host = [](char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) || c == '-' || c == '.';
+  };
+  if (peer.host.empty() || peer.host.size() > kLongestHost || !std::ranges::all_of(peer.host, of_host))
+    fail(name, "'host' must be a name or an IPv4 address");
+  const json port = configured.value("port", json());
+  if (!port.is_number_integer() || port < 1 || port > kHighestPort)
+    fail(name, "'port' must be a number from 1 to 65535");
+  port.get_to(peer.port);
+  if (configured.contains("calling_aet")) peer.calling = ae_title_in(configured, name, "calling_aet");
+  return peer;
+}
+
 Node node_from(const std::string& name, const json& configured) {
   if (!is_id_shaped(name)) fail(name, "a name has 1 to 64 letters, digits, '-' and '_'");
-  if (!configured.is_object()) fail(name, "must be an object with 'dicomweb'");
-  for (const auto& [member, value] : configured.items())
-    if (member != "dicomweb" && member != "credentials_file")
-      fail(name, "'" + member + "' is not known; known are dicomweb and credentials_file");
+  if (!configured.is_object()) fail(name, "must be an object with 'dicomweb' or 'dimse'");
+  if (configured.contains("dimse")) {
+    if (configured.size() > 1) fail(name, "a node with 'dimse' has no other member");
+    return {.name = name, .dimse = peer_from(name, configured["dimse"])};
+  }
+  know(configured, name, {"dicomweb", "credentials_file", "dimse"});
 
-  Node node{name, text_in(configured, name, "dicomweb"), {}, {}};
+  Node node{name, text_in(configured, name, "dicomweb")};
   if (!node.url.starts_with("http://") && !node.url.starts_with("https://"))
     fail(name, "'dicomweb' must be an http:// or https:// address");
   if (node.url.find_first_of(" ?#") != std::string::npos)

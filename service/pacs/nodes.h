@@ -1,22 +1,34 @@
 #pragma once
 
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
 namespace volsmooth {
 
-/// A DICOMweb server that jobs may fetch series from and send results to.
-struct Node {
-  std::string name;
-  std::string url;    ///< of its DICOMweb root, without a slash at the end
-  std::string login;  ///< "user:password" for Basic authentication; empty: none
-  std::string token;  ///< for Bearer authentication; empty: none
+/// An application entity that takes instances by C-STORE.
+struct DimsePeer {
+  std::string host;  ///< a name or an IPv4 address
+  int port = 0;
+  std::string called;   ///< its AE title
+  std::string calling;  ///< ours
 };
 
-/// Reads the member "nodes" of the configuration: `{name: {"dicomweb": url, "credentials_file": path}}`. The
-/// file of credentials holds one line, `user:password` (Basic) or a token (Bearer), and only its owner may
-/// read it. Throws std::runtime_error with what is wrong and where.
+/// A DICOMweb server that jobs may fetch series from and send results to, or a peer that these can be sent
+/// to.
+struct Node {
+  std::string name;
+  std::string url = {};                 ///< of its DICOMweb root, without a slash at the end
+  std::string login = {};               ///< "user:password" for Basic authentication; empty: none
+  std::string token = {};               ///< for Bearer authentication; empty: none
+  std::optional<DimsePeer> dimse = {};  ///< in place of all that
+};
+
+/// Reads the member "nodes" of the configuration: `{name: {"dicomweb": url, "credentials_file": path}}` or
+/// `{name: {"dimse": {"host": name, "port": number, "aet": title, "calling_aet": title}}}`. The file of
+/// credentials holds one line, `user:password` (Basic) or a token (Bearer), and only its owner may read it.
+/// Throws std::runtime_error with what is wrong and where.
 std::vector<Node> nodes_from(const nlohmann::json& configured);
 
 }  // namespace volsmooth

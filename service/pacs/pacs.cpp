@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "service/pacs/dimse_child.h"
+#include "service/pacs/dimse_sending.h"
 #include "service/pacs/instances.h"
 #include "service/pacs/retrieval.h"
 #include "service/pacs/sending.h"
@@ -10,9 +12,10 @@
 namespace volsmooth {
 
 Pacs make_pacs(std::vector<Node> nodes, std::vector<Preset> presets, std::int64_t max_bytes) {
+  if (std::ranges::any_of(nodes, [](const Node& node) { return node.dimse.has_value(); })) dimse_program();
   Pacs pacs;
   pacs.presets = std::move(presets);
-  for (const Node& node : nodes) pacs.nodes.push_back({node.name, true});
+  for (const Node& node : nodes) pacs.nodes.push_back({node.name, !node.dimse});
   // A job that was accepted under another configuration may name a node that is not there any more.
   const auto find = [nodes = std::move(nodes)](const std::string& name) -> tl::expected<Node, NodeFailure> {
     const auto found = std::ranges::find(nodes, name, &Node::name);
@@ -32,8 +35,10 @@ Pacs make_pacs(std::vector<Node> nodes, std::vector<Preset> presets, std::int64_
   };
   pacs.send = [find](const std::string& name, const std::filesystem::path& file,
                      std::span<const DicomInstance> instances, const auto& on_answers) {
-    return find(name).and_then(
-        [&](const Node& node) { return send_instances(node, file, instances, on_answers); });
+    return find(name).and_then([&](const Node& node) {
+      return node.dimse ? store_instances(node, file, instances, on_answers)
+                        : send_instances(node, file, instances, on_answers);
+    });
   };
   return pacs;
 }

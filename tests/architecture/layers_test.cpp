@@ -37,9 +37,10 @@ const std::map<std::string, std::vector<std::string>> kMayInclude = {
     {"service/pipeline",
      {"service/jobs/job.h", "service/jobs/problem.h", "service/jobs/job_json.h", "algorithms/"}},
     {"service/ingest", {"algorithms/formats/", "algorithms/volume/geometry.h", "algorithms/surface/mesh.h"}},
+    {"service/dimse", {}},
     {"service/pacs",
-     {"service/jobs/", "service/storage/incoming_file.h", "algorithms/progress.h",
-      "algorithms/formats/zip_"}},
+     {"service/jobs/", "service/storage/incoming_file.h", "service/storage/posix.h",
+      "service/dimse/channel.h", "algorithms/progress.h", "algorithms/formats/zip_"}},
     {"client", {}},
 };
 
@@ -54,10 +55,11 @@ const std::map<std::string, std::vector<std::string>> kLibraryHomes = {
     {"png", {"algorithms/formats"}},
     {"isa-l", {"algorithms/formats", "algorithms/formats/dicom"}},
     {"gdcm", {"algorithms/formats/dicom"}},
-    {"seccomp", {"service/ingest"}},
+    {"dcmtk/", {"service/dimse"}},
+    {"seccomp", {"service/ingest", "service/dimse"}},
     {"nlohmann/",
      {"service", "service/http", "service/jobs", "service/pacs", "service/pipeline", "service/ingest",
-      "client"}},
+      "service/dimse", "client"}},
 };
 
 struct Include {

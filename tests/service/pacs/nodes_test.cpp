@@ -21,6 +21,12 @@ class Nodes : public testing::Test {
     ::chmod(path.c_str(), mode);
     return path;
   }
+  /// A good peer but for these members.
+  static json peer(const json& but) {
+    json members = {{"host", "pacs"}, {"port", 104}, {"aet", "PACS"}};
+    members.update(but);
+    return {{"dimse", members}};
+  }
   ScratchFolder scratch_;
 };
 
@@ -39,6 +45,19 @@ TEST_F(Nodes, CredentialsAreALoginOrAToken) {
   EXPECT_EQ(nodes_from(token)[0].token, "abc.def");
 }
 
+TEST_F(Nodes, APeerIsAHostAPortAndAnAeTitle) {
+  const auto nodes =
+      nodes_from(json{{"p", {{"dimse", {{"host", "pacs-1.example"}, {"port", 104}, {"aet", "PACS"}}}}}});
+  ASSERT_EQ(nodes.size(), 1U);
+  ASSERT_TRUE(nodes[0].dimse);
+  EXPECT_EQ(nodes[0].dimse->host, "pacs-1.example");
+  EXPECT_EQ(nodes[0].dimse->port, 104);
+  EXPECT_EQ(nodes[0].dimse->called, "PACS");
+  EXPECT_EQ(nodes[0].dimse->calling, "VOLSMOOTH");
+  const json ours = {{"p", peer({{"calling_aet", "SMOOTHER"}})}};
+  EXPECT_EQ(nodes_from(ours)[0].dimse->calling, "SMOOTHER");
+}
+
 TEST_F(Nodes, WhatIsWrongIsRefusedWithItsPlace) {
   const std::vector<std::pair<json, std::string>> table = {
       {json::array(), "'nodes' must be an object"},
@@ -51,6 +70,18 @@ TEST_F(Nodes, WhatIsWrongIsRefusedWithItsPlace) {
       {{{"p", {{"dicomweb", "http://p"}, {"tls", true}}}}, "'tls' is not known"},
       {{{"p", {{"dicomweb", "http://p"}, {"credentials_file", "/nowhere"}}}}, "cannot be read"},
       {{{"p", {{"dicomweb", "http://p"}, {"credentials_file", file_with("t", 0640)}}}}, "owner's alone"},
+      {{{"p", {{"dicomweb", "http://p"}, {"dimse", json::object()}}}}, "has no other member"},
+      {{{"p", {{"dimse", "pacs:104"}}}}, "'dimse' must be an object with"},
+      {{{"p", peer({{"tls", true}})}}, "'tls' is not known; known are host, port, aet, calling_aet"},
+      {{{"p", peer({{"host", ""}})}}, "'host' must be a name"},
+      {{{"p", peer({{"host", "::1"}})}}, "'host' must be a name or an IPv4"},
+      {{{"p", peer({{"host", "pacs/x"}})}}, "'host' must be a name"},
+      {{{"p", peer({{"port", 0}})}}, "'port' must be a number from 1"},
+      {{{"p", peer({{"port", 65536}})}}, "'port' must be a number from 1"},
+      {{{"p", peer({{"port", "104"}})}}, "'port' must be a number from 1"},
+      {{{"p", peer({{"aet", "SEVENTEEN_LETTERS"}})}}, "'aet' must be an AE title"},
+      {{{"p", peer({{"aet", nullptr}})}}, "'aet' must be text"},
+      {{{"p", peer({{"calling_aet", ""}})}}, "'calling_aet' must be an AE title"},
   };
   for (const auto& [configured, expected] : table) {
     try {

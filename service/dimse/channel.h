@@ -1,0 +1,67 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+namespace volsmooth {
+
+// What volsmoothd and volsmooth-dimse say to each other, over a stream socket that is the child's standard
+// input. Instances are Part 10 files (DICOM PS3.10): their bytes, in pieces, then a document that ends them.
+//
+// send: the daemon asks for an association, {"host", "port", "called", "calling", "sop_classes": [UID]}, and
+// gets {} or a failure. Then, for each instance, it sends its bytes, {"sop_class", "sop_instance"}, and gets
+// {"status": of the C-STORE response}, {"failure": "not-accepted"}, or a failure that ends it all. It closes
+// its side when it has no more. A failure is {"failure": "unreachable" | "lost"}, or {"failure": "rejected",
+// "result", "source", "reason"} with the numbers of PS3.8, 9.3.4.
+//
+// receive: the child, whose descriptor 3 is an accepted connection, says {"called", "calling"} and gets
+// {"reject": 0 or source << 8 | reason}. Then, for each instance that comes, the daemon gets its bytes and
+// {"sop_class", "sop_instance", "whole"}; it answers {"status": for the C-STORE response} if it was whole.
+
+constexpr int kChannelDescriptor = 0, kConnectionDescriptor = 3;
+
+/// The other side is gone, silent, or says what it must not.
+class ChannelError : public std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// One end of the stream, whose descriptor stays its owner's. Used by one thread at a time.
+class Channel {
+ public:
+  explicit Channel(int descriptor) : descriptor_(descriptor) {}
+
+  struct Message {
+    bool is_document = false;
+    std::string content;
+  };
+  static constexpr std::size_t kLongestMessage = std::size_t{1} << 20;
+
+  // All of these throw ChannelError. `send` waits for the other side for kStalled at most.
+
+  void send(const nlohmann::json& document);
+  void send_bytes(std::span<const std::byte> bytes);
+  /// None: the other side has closed it.
+  std::optional<Message> receive(std::chrono::milliseconds patience);
+  /// A document, when nothing else may come.
+  nlohmann::json receive_document(std::chrono::milliseconds patience);
+
+  static constexpr std::chrono::seconds kStalled{120};
+
+ private:
+  void send(char kind, std::string_view content);
+  bool read_exactly(std::span<char> into, std::chrono::milliseconds patience);
+
+  const int descriptor_;
+};
+
+/// The document that a message is; throws ChannelError.
+nlohmann::json document_of(const Channel::Message& message);
+
+}  // namespace volsmooth

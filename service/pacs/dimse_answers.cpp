@@ -1,0 +1,62 @@
+#include "service/pacs/dimse_answers.h"
+
+#include <cstdio>
+
+namespace volsmooth {
+namespace {
+
+NodeFailure failure(const Node& node, bool is_passing, const std::string& what) {
+  return {{is_passing ? "node-unreachable" : "node-refused",
+           "The node '" + node.name + "' " + what + ".",
+           {{"node", node.name}}},
+          is_passing};
+}
+
+std::string hexadecimal(std::uint16_t status) {
+  char text[8];
+  std::snprintf(text, sizeof text, "0x%04X", static_cast<unsigned>(status));
+  return text;
+}
+
+bool is_warning(std::uint16_t status) {
+  constexpr std::uint16_t kClass = 0xF000, kWarnings = 0xB000;
+  constexpr std::uint16_t kWarning = 0x0001, kAttributeList = 0x0107, kValueRange = 0x0116;
+  return (status & kClass) == kWarnings || status == kWarning || status == kAttributeList ||
+         status == kValueRange;
+}
+
+/// DICOM PS3.8, table 9-21.
+const char* reason_text(int source, int reason) {
+  constexpr int kUser = 1, kPresentation = 3;
+  if (source == kUser && reason == 3) return "it does not know our AE title";
+  if (source == kUser && reason == 7) return "it has no such AE title";
+  if (source == kPresentation) return "it is busy";
+  return "it gives no reason that helps";
+}
+
+}  // namespace
+
+tl::expected<InstanceAnswer, NodeFailure> outcome_of(const Node& node, const std::string& sop_instance_uid,
+                                                     std::uint16_t status) {
+  constexpr std::uint16_t kSuccess = 0, kClass = 0xFF00, kOutOfResources = 0xA700;
+  if ((status & kClass) == kOutOfResources)
+    return tl::unexpected(failure(node, true, "is out of resources (status " + hexadecimal(status) + ")"));
+  if (status == kSuccess) return InstanceAnswer{sop_instance_uid, true, {}};
+  return InstanceAnswer{sop_instance_uid, is_warning(status), hexadecimal(status)};
+}
+
+NodeFailure failure_from(const Node& node, const nlohmann::json& told) {
+  constexpr int kPermanently = 1;
+  const auto what = told.value("failure", "");
+  if (what == "unreachable") return failure(node, true, "cannot be reached");
+  if (what != "rejected") return connection_lost(node);
+  return failure(node, told.value("result", 0) != kPermanently,
+                 std::string("rejected the association: ") +
+                     reason_text(told.value("source", 0), told.value("reason", 0)));
+}
+
+NodeFailure connection_lost(const Node& node) {
+  return failure(node, true, "broke off the association");
+}
+
+}  // namespace volsmooth

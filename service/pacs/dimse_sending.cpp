@@ -1,0 +1,92 @@
+#include "service/pacs/dimse_sending.h"
+
+#include <set>
+
+#include "service/pacs/dimse_answers.h"
+#include "service/pacs/dimse_child.h"
+#include "service/pacs/instances.h"
+
+namespace volsmooth {
+namespace {
+
+using nlohmann::json;
+
+/// Beyond the limits that volsmooth-dimse keeps itself.
+constexpr std::chrono::seconds kAssociationPatience{120}, kResponsePatience{300};
+constexpr std::size_t kSlowestBytesPerSecond = std::size_t{64} << 10;
+
+json association_for(const DimsePeer& peer, std::span<const DicomInstance> instances) {
+  std::set<std::string> sop_classes;
+  for (const DicomInstance& instance : instances) sop_classes.insert(instance.sop_class_uid);
+  return {{"host", peer.host},
+          {"port", peer.port},
+          {"called", peer.called},
+          {"calling", peer.calling},
+          {"sop_classes", sop_classes}};
+}
+
+/// One association, from the request on.
+class Storing {
+ public:
+  Storing(const Node& node, std::span<const DicomInstance> instances)
+      : node_(node), child_("send"), channel_(child_.channel()) {
+    channel_.send(association_for(*node.dimse, instances));
+  }
+
+  tl::expected<void, NodeFailure> opened() {
+    const json told = channel_.receive_document(kAssociationPatience);
+    if (told.contains("failure")) return tl::unexpected(failure_from(node_, told));
+    return {};
+  }
+
+  tl::expected<InstanceAnswer, NodeFailure> store(const DicomInstance& instance,
+                                                  std::span<const std::byte> bytes) {
+    channel_.send_bytes(bytes);
+    channel_.send({{"sop_class", instance.sop_class_uid}, {"sop_instance", instance.sop_instance_uid}});
+    const json told = channel_.receive_document(kResponsePatience +
+                                                std::chrono::seconds(bytes.size() / kSlowestBytesPerSecond));
+    constexpr std::uint16_t kClassNotSupported = 0x0122;
+    if (told.value("failure", "") == "not-accepted")
+      return outcome_of(node_, instance.sop_instance_uid, kClassNotSupported);
+    if (told.contains("failure")) return tl::unexpected(failure_from(node_, told));
+    return outcome_of(node_, instance.sop_instance_uid, told.at("status").get<std::uint16_t>());
+  }
+
+  void finish() { child_.finish(); }
+
+ private:
+  const Node& node_;
+  DimseChild child_;
+  Channel channel_;
+};
+
+}  // namespace
+
+tl::expected<void, NodeFailure> store_instances(
+    const Node& node, const std::filesystem::path& file, std::span<const DicomInstance> instances,
+    const std::function<void(std::span<const InstanceAnswer>)>& on_answers) {
+  std::set<std::string> wanted;
+  for (const DicomInstance& instance : instances) wanted.insert(instance.sop_instance_uid);
+  try {
+    Storing storing(node, instances);
+    if (auto opened = storing.opened(); !opened) return opened;
+    std::optional<NodeFailure> failure;
+    for_each_instance(file, [&](const DicomInstance& instance, std::span<const std::byte> bytes) {
+      if (failure || !wanted.contains(instance.sop_instance_uid)) return;
+      if (const auto answer = storing.store(instance, bytes)) {
+        on_answers(std::span(&*answer, 1));
+      } else {
+        failure = answer.error();
+      }
+    });
+    if (failure) return tl::unexpected(*std::move(failure));
+    storing.finish();
+    return {};
+  } catch (const ChannelError&) {
+    return tl::unexpected(connection_lost(node));
+  } catch (const json::exception&) {  // it says what it must not
+    return tl::unexpected(connection_lost(node));
+  }
+}
+
+}  // namespace volsmooth
