@@ -4,6 +4,7 @@
 #include <isa-l/igzip_lib.h>
 
 #include <limits>
+#include <memory>
 #include <stdexcept>
 
 #include "algorithms/formats/zip_records.h"
@@ -13,44 +14,15 @@ namespace {
 
 constexpr std::uint32_t kFileMode = 0100644;
 
-}  // namespace
-
-ZipWriter::ZipWriter(Sink sink) : sink_(std::move(sink)), level_buffer_(ISAL_DEF_LVL1_DEFAULT) {}
-
-void ZipWriter::add(const std::string& name, std::span<const std::byte> content) {
-  constexpr std::size_t kMost = std::numeric_limits<std::uint32_t>::max() / 1001 * 1000 - 1024;
-  if (content.size() > kMost) throw std::logic_error("a file of 4 GiB for an archive");
-  const auto packed = deflated(content);
-  ZipHeader entry;
-  entry.name = name;
-  entry.flags = kZipUtf8Names;
-  entry.method = kZipDeflated;
-  entry.crc = crc32_gzip_refl(0, reinterpret_cast<const unsigned char*>(content.data()), content.size());
-  entry.packed_size = packed.size();
-  entry.size = content.size();
-  entry.mode = kFileMode;
-  entry.header_offset = written_;
-  put(local_header_bytes(entry));
-  put(packed);
-  const auto record = directory_record_bytes(entry);
-  directory_.insert(directory_.end(), record.begin(), record.end());
-  ++entries_;
-}
-
-void ZipWriter::finish() {
-  const ZipEnd end{entries_, written_, directory_.size()};
-  put(directory_);
-  put(zip_end_bytes(end));
-}
-
-std::vector<std::byte> ZipWriter::deflated(std::span<const std::byte> content) {
+std::vector<std::byte> deflated(std::span<const std::byte> content) {
   // Deflate grows by at most 5 bytes per stored block of at most 65535.
   std::vector<std::byte> out(content.size() + content.size() / 1000 + 1024);
+  const auto level_buffer = std::make_unique_for_overwrite<std::uint8_t[]>(ISAL_DEF_LVL1_DEFAULT);
   isal_zstream stream;
   isal_deflate_stateless_init(&stream);
   stream.level = 1;
-  stream.level_buf = level_buffer_.data();
-  stream.level_buf_size = static_cast<std::uint32_t>(level_buffer_.size());
+  stream.level_buf = level_buffer.get();
+  stream.level_buf_size = ISAL_DEF_LVL1_DEFAULT;
   stream.end_of_stream = 1;
   stream.next_in = reinterpret_cast<std::uint8_t*>(const_cast<std::byte*>(content.data()));
   stream.avail_in = static_cast<std::uint32_t>(content.size());
@@ -60,6 +32,38 @@ std::vector<std::byte> ZipWriter::deflated(std::span<const std::byte> content) {
     throw std::logic_error("a deflated file is larger than it can be");
   out.resize(stream.total_out);
   return out;
+}
+
+}  // namespace
+
+PackedFile pack(std::span<const std::byte> content) {
+  constexpr std::size_t kMost = std::numeric_limits<std::uint32_t>::max() / 1001 * 1000 - 1024;
+  if (content.size() > kMost) throw std::logic_error("a file of 4 GiB for an archive");
+  return {deflated(content), content.size(),
+          crc32_gzip_refl(0, reinterpret_cast<const unsigned char*>(content.data()), content.size())};
+}
+
+void ZipWriter::add(const std::string& name, const PackedFile& file) {
+  ZipHeader entry;
+  entry.name = name;
+  entry.flags = kZipUtf8Names;
+  entry.method = kZipDeflated;
+  entry.crc = file.crc;
+  entry.packed_size = file.deflated.size();
+  entry.size = file.size;
+  entry.mode = kFileMode;
+  entry.header_offset = written_;
+  put(local_header_bytes(entry));
+  put(file.deflated);
+  const auto record = directory_record_bytes(entry);
+  directory_.insert(directory_.end(), record.begin(), record.end());
+  ++entries_;
+}
+
+void ZipWriter::finish() {
+  const ZipEnd end{entries_, written_, directory_.size()};
+  put(directory_);
+  put(zip_end_bytes(end));
 }
 
 void ZipWriter::put(std::span<const std::byte> bytes) {

@@ -20,6 +20,11 @@ std::size_t size_of(int descriptor) {
   return static_cast<std::size_t>(status.st_size);
 }
 
+void tell_progress(double fraction) {
+  // Nothing depends on it.
+  [[maybe_unused]] const ssize_t written = ::pwrite(kProgressDescriptor, &fraction, sizeof fraction, 0);
+}
+
 SeriesOptions series_options(const Json& options) {
   SeriesOptions series;
   series.series = options.at("series").get<std::string>();
@@ -40,6 +45,9 @@ Json read_options() {
 IngestCall open_call(Json options) {
   IngestCall call;
   call.series = series_options(options);
+  const int threads = options.at("threads").get<int>();
+  call.series.execution = {threads, part_of(tell_progress, 0, 0.5)};
+  call.second_half = {threads, part_of(tell_progress, 0.5, 1)};
   call.options = std::move(options);
   const std::size_t bytes = size_of(kUploadDescriptor);
   if (bytes == 0) return call;

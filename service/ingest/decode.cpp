@@ -64,7 +64,7 @@ nlohmann::json answer_decode(const IngestCall& call) {
     for (std::size_t i = 0; i < padded.size(); ++i)
       if (padded[i] != 0) padding.mark(first + i, intensities[i]);
   };
-  const auto facts = decode_series(*series, take);
+  const auto facts = decode_series(*series, take, call.second_half);
   if (!facts) return answer_of(facts.error());
   if (facts->padded_voxels > 0) {
     fill(padding, voxels, static_cast<float>(facts->intensity_min));

@@ -75,14 +75,16 @@ std::span<const T> take(Bytes& input, std::size_t count) {
 }
 
 /// The input: float32 intensities, x fastest. The output: a zip.
-Made derive_series(const DicomSeries& series, const Derivation& derivation, const Json&) {
+Made derive_series(const DicomSeries& series, const Derivation& derivation, const Json&,
+                   const Execution& execution) {
   Bytes input = map_input();
   const auto voxels = static_cast<std::size_t>(voxel_count(series.size));
   if (input.size() != voxels * sizeof(float)) throw std::invalid_argument("voxels of another volume");
   ZipWriter zip(write_output);
-  const auto made =
-      write_derived_series(series, take<float>(input, voxels), derivation,
-                           [&zip](const std::string& name, Bytes file) { zip.add(name, file); });
+  const auto pack_up = [&zip](const std::string& name, Bytes file) {
+    return [&zip, name, packed = pack(file)] { zip.add(name, packed); };
+  };
+  const auto made = write_derived_series(series, take<float>(input, voxels), derivation, pack_up, execution);
   if (!made) return tl::unexpected(made.error());
   zip.finish();
   return Json{{"clipped_voxels", made->clipped_voxels}};
@@ -90,7 +92,8 @@ Made derive_series(const DicomSeries& series, const Derivation& derivation, cons
 
 /// The input and the output: a file.
 template <MeshEncoding encoding>
-Made derive_mesh(const DicomSeries& series, const Derivation& derivation, const Json& options) {
+Made derive_mesh(const DicomSeries& series, const Derivation& derivation, const Json& options,
+                 const Execution&) {
   const auto object =
       encapsulated_mesh(series, encoding, map_input(), options.at("title").get<std::string>(), derivation);
   if (!object) return tl::unexpected(object.error());
@@ -99,7 +102,8 @@ Made derive_mesh(const DicomSeries& series, const Derivation& derivation, const 
 }
 
 /// The input: of every surface positions and normals as float32, then vertex numbers as uint32.
-Made derive_segmentation(const DicomSeries& series, const Derivation& derivation, const Json& options) {
+Made derive_segmentation(const DicomSeries& series, const Derivation& derivation, const Json& options,
+                         const Execution&) {
   Bytes input = map_input();
   std::vector<SegmentSurface> surfaces;
   for (const Json& surface : options.at("surfaces")) {
@@ -117,7 +121,8 @@ Made derive_segmentation(const DicomSeries& series, const Derivation& derivation
 
 struct Product {
   std::string_view name;
-  Made (*make)(const DicomSeries& series, const Derivation& derivation, const Json& options);
+  Made (*make)(const DicomSeries& series, const Derivation& derivation, const Json& options,
+               const Execution& execution);
 };
 
 constexpr Product kProducts[] = {{"dicom-series", derive_series},
@@ -134,7 +139,7 @@ nlohmann::json answer_derive(const IngestCall& call) {
     if (product.name != output) continue;
     const auto series = read_series(call.upload, call.series);
     if (!series) return answer_of(series.error());
-    const auto made = product.make(*series, derivation_from(options), options);
+    const auto made = product.make(*series, derivation_from(options), options, call.second_half);
     return made ? Json{{"made", *made}} : answer_of(made.error());
   }
   throw std::invalid_argument("no such output");

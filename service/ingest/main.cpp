@@ -14,7 +14,6 @@
 
 namespace {
 
-constexpr int kKeptBytes = 64 << 20;
 constexpr int kUsageError = 2, kNoSandbox = 70, kGivenUp = 1;
 
 void write_answer(const nlohmann::json& answer) {
@@ -26,9 +25,11 @@ void write_answer(const nlohmann::json& answer) {
   }
 }
 
-/// Files come and go one by one: memory that is freed is kept for the next, which halves the time.
+/// Files come and go one by one: memory that is freed is kept for the next, which halves the time. All
+/// threads share one arena, lest each set addresses aside.
 void keep_freed_memory() {
   constexpr int kMiB = 1 << 20;
+  ::mallopt(M_ARENA_MAX, 1);
   ::mallopt(M_MMAP_THRESHOLD, 32 * kMiB);
   ::mallopt(M_TRIM_THRESHOLD, 512 * kMiB);
   ::mallopt(M_TOP_PAD, 64 * kMiB);
@@ -43,8 +44,6 @@ volsmooth::SandboxLimits limits_of(const nlohmann::json& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  ::mallopt(M_MMAP_THRESHOLD, kKeptBytes);  // slices come and go: their pages need not
-  ::mallopt(M_TRIM_THRESHOLD, kKeptBytes);
   const auto commands = volsmooth::ingest_commands();
   const auto command =
       argc == 2 ? std::ranges::find(commands, argv[1], &volsmooth::IngestCommand::name) : commands.end();

@@ -1,5 +1,6 @@
 #include "service/ingest/sandbox.h"
 
+#include <sched.h>
 #include <seccomp.h>
 #include <signal.h>
 #include <sys/mman.h>
@@ -28,30 +29,53 @@ void limit(__rlimit_resource resource, std::int64_t most) {
   check(::setrlimit(resource, &value) == 0, errno, "setrlimit");
 }
 
-/// Memory, the open descriptors, the time, threads' locks, and the end.
+/// What a thread is made with (glibc); anything else may be a process.
+constexpr unsigned kThreadFlags = CLONE_VM | CLONE_FS | CLONE_FILES | CLONE_SIGHAND | CLONE_THREAD |
+                                  CLONE_SYSVSEM | CLONE_SETTLS | CLONE_PARENT_SETTID | CLONE_CHILD_CLEARTID;
+
+/// Memory, the open descriptors, the time, threads and their locks, and the end.
 constexpr int kAllowed[] = {
-    SCMP_SYS(read),         SCMP_SYS(pread64),         SCMP_SYS(write),     SCMP_SYS(pwrite64),
-    SCMP_SYS(writev),       SCMP_SYS(lseek),           SCMP_SYS(fstat),     SCMP_SYS(ftruncate),
-    SCMP_SYS(close),        SCMP_SYS(munmap),          SCMP_SYS(mremap),    SCMP_SYS(madvise),
-    SCMP_SYS(brk),          SCMP_SYS(futex),           SCMP_SYS(getrandom), SCMP_SYS(clock_gettime),
-    SCMP_SYS(sched_yield),  SCMP_SYS(rt_sigreturn),    SCMP_SYS(exit),      SCMP_SYS(exit_group),
-    SCMP_SYS(gettimeofday), SCMP_SYS(restart_syscall),
+    SCMP_SYS(read),
+    SCMP_SYS(pread64),
+    SCMP_SYS(write),
+    SCMP_SYS(pwrite64),
+    SCMP_SYS(writev),
+    SCMP_SYS(lseek),
+    SCMP_SYS(fstat),
+    SCMP_SYS(ftruncate),
+    SCMP_SYS(close),
+    SCMP_SYS(munmap),
+    SCMP_SYS(mremap),
+    SCMP_SYS(madvise),
+    SCMP_SYS(brk),
+    SCMP_SYS(futex),
+    SCMP_SYS(getrandom),
+    SCMP_SYS(clock_gettime),
+    SCMP_SYS(sched_yield),
+    SCMP_SYS(rt_sigreturn),
+    SCMP_SYS(exit),
+    SCMP_SYS(exit_group),
+    SCMP_SYS(gettimeofday),
+    SCMP_SYS(restart_syscall),
+    SCMP_SYS(set_robust_list),
+    SCMP_SYS(rseq),
+    SCMP_SYS(rt_sigprocmask),
+    SCMP_SYS(rt_sigaction),
 };
 
 void allow_system_calls() {
   const std::unique_ptr<void, void (*)(scmp_filter_ctx)> filter(::seccomp_init(SCMP_ACT_KILL_PROCESS),
                                                                 ::seccomp_release);
   check(filter != nullptr, ENOMEM, "seccomp_init");
-  const auto allow = [&](int call) {
-    const int result = ::seccomp_rule_add(filter.get(), SCMP_ACT_ALLOW, call, 0);
+  const auto add = [&](std::uint32_t action, int call, auto... condition) {
+    const int result = ::seccomp_rule_add(filter.get(), action, call, sizeof...(condition), condition...);
     check(result == 0, -result, "seccomp_rule_add");
   };
-  for (const int call : kAllowed) allow(call);
-  for (const int call : {SCMP_SYS(mmap), SCMP_SYS(mprotect)}) {  // never for code
-    const int result =
-        ::seccomp_rule_add(filter.get(), SCMP_ACT_ALLOW, call, 1, SCMP_A2(SCMP_CMP_MASKED_EQ, PROT_EXEC, 0));
-    check(result == 0, -result, "seccomp_rule_add");
-  }
+  for (const int call : kAllowed) add(SCMP_ACT_ALLOW, call);
+  for (const int call : {SCMP_SYS(mmap), SCMP_SYS(mprotect)})  // never for code
+    add(SCMP_ACT_ALLOW, call, SCMP_A2(SCMP_CMP_MASKED_EQ, PROT_EXEC, 0));
+  add(SCMP_ACT_ALLOW, SCMP_SYS(clone), SCMP_A0(SCMP_CMP_EQ, kThreadFlags));
+  add(SCMP_ACT_ERRNO(ENOSYS), SCMP_SYS(clone3));  // whose flags no filter sees; glibc takes clone then
   const int result = ::seccomp_load(filter.get());
   check(result == 0, -result, "seccomp_load");
 }

@@ -12,9 +12,9 @@ struct SandboxLimits {
 };
 
 /// Gives up, for the rest of the process's life, everything that decoding does not need: no file can be
-/// opened, no socket made, no program started, nothing waited for; memory and CPU time are limited, and it
-/// dies with its parent. A forbidden system call ends the process. Throws std::system_error where the kernel
-/// cannot.
+/// opened, no socket made, no process or program started, nothing waited for; memory and CPU time are
+/// limited, and it dies with its parent. A forbidden system call ends the process. Throws std::system_error
+/// where the kernel cannot.
 void enter_sandbox(const SandboxLimits& limits);
 
 }  // namespace volsmooth

@@ -10,6 +10,7 @@
 
 #include "algorithms/formats/dicom_upload.h"
 #include "algorithms/formats/nifti_header_for.h"
+#include "algorithms/volume/parallel.h"
 #include "service/pipeline/ingest_child.h"
 
 namespace volsmooth {
@@ -18,6 +19,8 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr std::int64_t kMiB = std::int64_t{1} << 20;
+constexpr int kMostThreads = 8;  ///< of a child: slices are handed over one by one
+constexpr std::int64_t kStackBytes = 16 * kMiB;
 
 void check(bool done, const char* what) {
   if (!done) throw std::system_error(errno, std::generic_category(), what);
@@ -46,7 +49,7 @@ tl::expected<Json, Problem> ask(const char* command, const Descriptor& upload, i
   IngestOrder order{.command = command, .upload = upload.get(), .output = output};
   order.options = ingest_options(options, limits, size_of(upload), voxels);
   order.patience = patience_for(order.options);
-  return run_ingest(program_of(limits), order, [&] { report(0); });
+  return run_ingest(program_of(limits), order, report);
 }
 
 VolumeDescription description_from(const Json& volume) {
@@ -120,10 +123,12 @@ Json ingest_options(const UploadOptions& options, const PipelineLimits& limits, 
   const std::int64_t written = 9 * voxels;
   std::int64_t held = 3 * unpacked + 2 * written;
   if (limits.max_memory_bytes > 0) held = std::min(held, limits.max_memory_bytes);
+  const int threads = std::min(thread_count(), kMostThreads);
   return {{"series", options.series},
           {"resample", options.resample},
           {"max_voxels", limits.max_voxels},
-          {"address_space_bytes", 1024 * kMiB + upload_bytes + held},
+          {"threads", threads},
+          {"address_space_bytes", 1024 * kMiB + upload_bytes + held + threads * kStackBytes},
           {"output_bytes", written + 64 * kMiB},
           {"cpu_seconds", 60 + upload_bytes / kMiB}};
 }
@@ -141,7 +146,9 @@ tl::expected<InputVolume, Problem> read_dicom(const std::filesystem::path& file,
                                               const PipelineLimits& limits, const Progress& report) {
   const Descriptor voxels = memory_file("voxels");
   const std::int64_t count = voxel_count(stored.facts.size);
-  const auto answer = ask("decode", open_upload(file), voxels.get(), count, stored.options, limits, report);
+  constexpr double kDecoded = 0.8;
+  const auto answer = ask("decode", open_upload(file), voxels.get(), count, stored.options, limits,
+                          part_of(report, 0, kDecoded));
   if (!answer) return tl::unexpected(answer.error());
   const Json& decoded = answer->at("volume");
   InputVolume input{description_from(decoded), nullptr};
@@ -149,7 +156,7 @@ tl::expected<InputVolume, Problem> read_dicom(const std::filesystem::path& file,
     throw std::runtime_error("a volume of another size was decoded");
   input.volume = make_volume(input.description.size, input.description.map);
   MemoryReader reader(voxels);
-  reader.read(std::as_writable_bytes(voxels_of(*input.volume)), report);
+  reader.read(std::as_writable_bytes(voxels_of(*input.volume)), part_of(report, kDecoded, 1));
   if (const auto padded = decoded.at("padded_voxels").get<std::size_t>(); padded > 0) {
     auto bits = read_values<std::uint8_t>(reader, (static_cast<std::size_t>(count) + 7) / 8);
     input.padding = Padding(std::move(bits), read_values<float>(reader, padded));

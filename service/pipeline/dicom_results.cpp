@@ -183,7 +183,7 @@ Json DicomResults::derive(const std::filesystem::path& file, const Json& options
     order.options[limit] = order.options[limit].get<std::int64_t>() + 4 * given + 256 * kMiB;
   order.patience = patience_for(order.options);
   const auto program = limits_.ingest_program.empty() ? ingest_beside_this_program() : limits_.ingest_program;
-  const auto answer = run_ingest(program, order, [&] { report(0); });
+  const auto answer = run_ingest(program, order, report);
   if (!answer) throw DeriveRefused{answer.error()};
   return answer->at("made");
 }

@@ -22,6 +22,8 @@ using Clock = std::chrono::steady_clock;
 
 constexpr int kNoSandbox = 70;  ///< its exit code for that
 constexpr std::chrono::milliseconds kPause{100};
+/// Its heap is hundreds of megabytes: where the kernel gives large pages, faults for small ones need not be.
+constexpr const char* kLargePages = "GLIBC_TUNABLES=glibc.malloc.hugetlb=1";
 constexpr std::size_t kLongestAnswer = std::size_t{64} << 20;
 
 void check(bool done, int error, const char* what) {
@@ -35,7 +37,7 @@ Problem decode_failed(const char* detail) {
 /// What the child has open: those, on the numbers that they stand at in `descriptors`, and nothing else.
 class SpawnActions {
  public:
-  explicit SpawnActions(const std::array<int, 6>& descriptors) {
+  explicit SpawnActions(const std::array<int, 7>& descriptors) {
     ::posix_spawn_file_actions_init(&actions_);
     for (std::size_t number = 0; number < descriptors.size(); ++number) {
       if (descriptors[number] < 0) continue;
@@ -60,7 +62,7 @@ class SpawnActions {
  private:
   static constexpr int kFirstFree = 10;
   posix_spawn_file_actions_t actions_{};
-  std::array<Descriptor, 6> copies_;
+  std::array<Descriptor, 7> copies_;
 };
 
 /// A child that is killed unless it was waited for.
@@ -77,9 +79,10 @@ class Child {
     ::posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
     const std::string name = program.filename();
     const std::array<const char*, 3> arguments{name.c_str(), command.c_str(), nullptr};
-    char* const no_environment[] = {nullptr};
+    const std::array<const char*, 2> environment{kLargePages, nullptr};
     const int error = ::posix_spawn(&process_, program.c_str(), actions.get(), &attributes,
-                                    const_cast<char* const*>(arguments.data()), no_environment);
+                                    const_cast<char* const*>(arguments.data()),
+                                    const_cast<char* const*>(environment.data()));
     ::posix_spawnattr_destroy(&attributes);
     check(error == 0, error, "starting volsmooth-ingest");
     descriptor_ = Descriptor(static_cast<int>(::syscall(SYS_pidfd_open, process_, 0)));
@@ -127,6 +130,13 @@ std::string content_of(int descriptor) {
   return text;
 }
 
+/// How far the child is, which is not to be believed.
+double told_by(int progress) {
+  double fraction = 0;
+  if (::pread(progress, &fraction, sizeof fraction, 0) != sizeof fraction) return 0;
+  return fraction > 0 && fraction < 1 ? fraction : fraction >= 1;
+}
+
 tl::expected<Json, Problem> parsed(const std::string& answer) {
   Json document = Json::parse(answer, nullptr, false);
   if (!document.is_object()) return tl::unexpected(decode_failed("The reader of DICOM gave no answer."));
@@ -152,14 +162,16 @@ Descriptor memory_file(const char* name) {
 }
 
 tl::expected<Json, Problem> run_ingest(const std::filesystem::path& program, const IngestOrder& order,
-                                       const std::function<void()>& while_waiting) {
-  const Descriptor answer = memory_file("answer"), options = memory_file("options");
+                                       const Progress& report) {
+  const Descriptor answer = memory_file("answer"), options = memory_file("options"),
+                   progress = memory_file("progress");
   write_all(options.get(), order.options.dump());
-  const SpawnActions actions({order.upload, answer.get(), -1, order.output, options.get(), order.input});
+  const SpawnActions actions(
+      {order.upload, answer.get(), -1, order.output, options.get(), order.input, progress.get()});
   Child child(program, order.command, actions);
   const auto end = Clock::now() + order.patience;
   while (!child.has_ended()) {
-    while_waiting();
+    report(told_by(progress.get()));
     if (Clock::now() > end) return tl::unexpected(decode_failed("Reading the DICOM files took too long."));
   }
   const int code = child.code();

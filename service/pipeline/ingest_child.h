@@ -2,11 +2,11 @@
 
 #include <chrono>
 #include <filesystem>
-#include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <tl/expected.hpp>
 
+#include "algorithms/progress.h"
 #include "service/jobs/problem.h"
 #include "service/pipeline/descriptor.h"
 
@@ -30,13 +30,12 @@ std::chrono::seconds patience_for(const nlohmann::json& options);
 /// volsmooth-ingest beside the running program.
 std::filesystem::path ingest_beside_this_program();
 
-/// Runs `program` in a process of its own and gives its answer. `while_waiting` is called ten times a second;
-/// the child is killed when it throws. A refusal is the problem that it says; a child that dies, gives up or
-/// takes too long is dicom-decode-failed. Throws std::system_error when no child can be started,
-/// std::runtime_error when it has no sandbox.
+/// Runs `program` in a process of its own and gives its answer. `report` is called ten times a second with
+/// how far the child says that it is; the child is killed when it throws. A refusal is the problem that it
+/// says; a child that dies, gives up or takes too long is dicom-decode-failed. Throws std::system_error when
+/// no child can be started, std::runtime_error when it has no sandbox.
 tl::expected<nlohmann::json, Problem> run_ingest(const std::filesystem::path& program,
-                                                 const IngestOrder& order,
-                                                 const std::function<void()>& while_waiting);
+                                                 const IngestOrder& order, const Progress& report);
 
 /// An empty file in memory that a child can be given; throws std::system_error.
 Descriptor memory_file(const char* name);

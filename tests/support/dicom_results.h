@@ -34,9 +34,11 @@ inline SeriesInMemory read_into_memory(std::string upload, const SeriesOptions& 
   if (!series) throw std::runtime_error(series.error().slug + ": " + series.error().detail);
   result.series = *std::move(series);
   auto facts = decode_series(
-      result.series, [&](std::int64_t, std::span<const float> intensities, std::span<const std::uint8_t>) {
+      result.series,
+      [&](std::int64_t, std::span<const float> intensities, std::span<const std::uint8_t>) {
         result.voxels.insert(result.voxels.end(), intensities.begin(), intensities.end());
-      });
+      },
+      options.execution);
   if (!facts) throw std::runtime_error(facts.error().slug);
   result.facts = *std::move(facts);
   return result;
@@ -67,11 +69,13 @@ struct Derived {
 inline Derived derive(const SeriesInMemory& source, std::span<const float> intensities,
                       const SeriesOptions& options = {}) {
   Derived derived;
-  const auto counts = write_derived_series(source.series, intensities, some_derivation(),
-                                           [&](const std::string&, std::span<const std::byte> file) {
-                                             derived.files.emplace_back(
-                                                 reinterpret_cast<const char*>(file.data()), file.size());
-                                           });
+  const auto take = [&](const std::string&, std::span<const std::byte> file) {
+    return [&derived, text = std::string(reinterpret_cast<const char*>(file.data()), file.size())] {
+      derived.files.push_back(text);
+    };
+  };
+  const auto counts =
+      write_derived_series(source.series, intensities, some_derivation(), take, options.execution);
   if (!counts) throw std::runtime_error(counts.error().slug);
   derived.counts = *counts;
   derived.again = read_into_memory(multipart_of(derived.files), options);

@@ -130,7 +130,7 @@ class HttpConnection {
     const bool sent = send(head + "\r\n") && send(body);
     auto response = read(method == "HEAD");
     if (!response) throw std::runtime_error(method + " " + target + (sent ? ": no answer" : ": cut off"));
-    return *response;
+    return *std::move(response);
   }
 
   /// Whether the daemon has closed its side; waits for that at most `seconds`, dropping what still comes.
@@ -153,8 +153,12 @@ class HttpConnection {
     while (buffer_.size() < count) {
       if (!fill()) return false;
     }
-    into.append(buffer_, 0, count);
-    buffer_.erase(0, count);
+    if (into.empty() && buffer_.size() == count) {
+      into.swap(buffer_);
+    } else {
+      into.append(buffer_, 0, count);
+      buffer_.erase(0, count);
+    }
     return true;
   }
 

@@ -8,8 +8,11 @@
 #include <gdcmSequenceOfItems.h>
 #include <gdcmSwapper.h>
 
+#include <array>
+#include <istream>
 #include <optional>
 #include <sstream>
+#include <streambuf>
 
 #include "algorithms/formats/dicom/refused.h"
 
@@ -66,6 +69,28 @@ gdcm::DataSet cleaned(const gdcm::DataSet& set, bool is_signed) {
   }
   return clean;
 }
+
+/// Bytes to read from where they lie, which a std::istringstream would copy.
+class ByteBuffer : public std::streambuf {
+ public:
+  explicit ByteBuffer(std::span<const std::byte> bytes) {
+    char* const begin = reinterpret_cast<char*>(const_cast<std::byte*>(bytes.data()));
+    setg(begin, begin, begin + bytes.size());
+  }
+
+ protected:
+  pos_type seekoff(off_type offset, std::ios::seekdir from, std::ios::openmode) override {
+    const off_type origin = from == std::ios::beg   ? 0
+                            : from == std::ios::cur ? gptr() - eback()
+                                                    : egptr() - eback();
+    return seekpos(origin + offset, std::ios::in);
+  }
+  pos_type seekpos(pos_type position, std::ios::openmode) override {
+    if (position < 0 || position > egptr() - eback()) return off_type{-1};
+    setg(eback(), eback() + static_cast<off_type>(position), egptr());
+    return position;
+  }
+};
 
 void append(std::string& file, std::uint16_t element, std::string_view vr, std::string value) {
   const bool is_bytes = vr == "OB";
@@ -176,7 +201,8 @@ gdcm::DataSet reference_item(const InstanceReference& reference) {
 }
 
 gdcm::DataSet public_attributes(std::span<const std::byte> part10) {
-  std::istringstream stream(std::string(reinterpret_cast<const char*>(part10.data()), part10.size()));
+  ByteBuffer buffer(part10);
+  std::istream stream(&buffer);
   gdcm::Reader reader;
   reader.SetStream(stream);
   if (!reader.ReadUpToTag(gdcm::Tag(0x7fe0, 0x0010)))
@@ -187,6 +213,21 @@ gdcm::DataSet public_attributes(std::span<const std::byte> part10) {
   const bool is_signed =
       signedness != nullptr && signedness->GetLength() > 0 && *signedness->GetPointer() == 1;
   return cleaned(set, is_signed);
+}
+
+void append_long_header(std::vector<std::byte>& file, std::uint32_t tag, std::string_view vr,
+                        std::uint32_t length) {
+  const auto put = [&file](const void* bytes, std::size_t count) {
+    const auto* first = static_cast<const std::byte*>(bytes);
+    file.insert(file.end(), first, first + count);
+  };
+  const std::array<std::uint16_t, 2> group_and_element{static_cast<std::uint16_t>(tag >> 16),
+                                                       static_cast<std::uint16_t>(tag & 0xffff)};
+  const std::uint16_t reserved = 0;
+  put(group_and_element.data(), sizeof group_and_element);
+  put(vr.data(), vr.size());
+  put(&reserved, sizeof reserved);
+  put(&length, sizeof length);
 }
 
 std::vector<std::byte> part10_file(const gdcm::DataSet& set) {

@@ -50,6 +50,10 @@ gdcm::DataSet reference_item(const InstanceReference& reference);
 /// Throws Refused: dicom-decode-failed.
 gdcm::DataSet public_attributes(std::span<const std::byte> part10);
 
+/// The header of an element of one of the VRs with four bytes of length, for the end of a file.
+void append_long_header(std::vector<std::byte>& file, std::uint32_t tag, std::string_view vr,
+                        std::uint32_t length);
+
 /// A Part 10 file of the data set in Explicit VR Little Endian, with an empty preamble.
 std::vector<std::byte> part10_file(const gdcm::DataSet& set);
 

@@ -53,9 +53,9 @@ gdcm::DataSet patient_and_study_of(const gdcm::DataSet& source) {
 }
 
 gdcm::DataSet attributes_of_first(const DicomSeries& series) {
-  const auto bytes = series.files->bytes(series.slices.front().file);
-  if (!bytes) throw Refused{bytes.error()};
-  return public_attributes(*bytes);
+  const auto file = series.files->open(series.slices.front().file);
+  if (!file) throw Refused{file.error()};
+  return public_attributes(file->bytes);
 }
 
 gdcm::DataSet algorithm_item(const Derivation& derivation) {

@@ -1,6 +1,7 @@
 #include "algorithms/formats/dicom/derived_pixels.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 
@@ -29,54 +30,112 @@ double resampled_index(const DicomSeries& series, std::size_t which) {
 
 /// A valid voxel must not become padding.
 std::int64_t beside(std::int64_t value, const DicomSlice& slice, const Range& range) {
-  if (!slice.padding) return value;
   const auto [lowest, highest] = *slice.padding;
   if (value < lowest || value > highest) return value;
   const bool below = lowest > range.lowest && (value - lowest < highest - value || highest >= range.highest);
   return below ? lowest - 1 : highest + 1;
 }
 
+double lower(double a, double b) {
+  return a < b ? a : b;
+}
+
+double higher(double a, double b) {
+  return a > b ? a : b;
+}
+
+/// Half to even; for numbers below 2^51. An addition, which std::nearbyint is not everywhere.
+double rounded(double number) {
+  constexpr double kNoFraction = 0x1.8p52;
+  return number + kNoFraction - kNoFraction;
+}
+
+/// Stored values behind `out`; the number of clipped ones. Part by part, in loops that become vector
+/// instructions.
+template <class Cell>
+std::int64_t store(std::span<const float> intensities, const DicomSlice& slice, const Range& range,
+                   std::byte* out) {
+  constexpr std::size_t kPart = 1024;
+  std::array<double, kPart> whole;
+  std::array<Cell, kPart> cells;
+  const double slope = slice.rescale_slope, intercept = slice.rescale_intercept;
+  const auto lowest = static_cast<double>(range.lowest), highest = static_cast<double>(range.highest);
+  std::int64_t clipped = 0;
+  for (std::size_t begin = 0; begin < intensities.size(); begin += kPart) {
+    const std::size_t count = std::min(kPart, intensities.size() - begin);
+    for (std::size_t i = 0; i < count; ++i) {
+      const double exact = (static_cast<double>(intensities[begin + i]) - intercept) / slope;
+      whole[i] = rounded(lower(higher(exact, lowest - 1), highest + 1));
+    }
+    for (std::size_t i = 0; i < count; ++i)
+      cells[i] = static_cast<Cell>(static_cast<std::int32_t>(lower(higher(whole[i], lowest), highest)));
+    for (std::size_t i = 0; i < count; ++i)
+      clipped += static_cast<std::int64_t>(whole[i] < lowest) + static_cast<std::int64_t>(whole[i] > highest);
+    std::memcpy(out + begin * sizeof(Cell), cells.data(), count * sizeof(Cell));
+  }
+  return clipped;
+}
+
+/// Gives back the padding of the original, and lets nothing else be padding.
+template <class Cell>
+void restore_padding(std::span<const std::int32_t> original, const DicomSlice& slice, const Range& range,
+                     std::byte* out) {
+  const auto [lowest, highest] = *slice.padding;
+  for (std::size_t i = 0; i < original.size(); ++i) {
+    Cell cell;
+    std::memcpy(&cell, out + i * sizeof(Cell), sizeof(Cell));
+    const bool was_padding = original[i] >= lowest && original[i] <= highest;
+    cell = static_cast<Cell>(was_padding ? original[i] : beside(cell, slice, range));
+    std::memcpy(out + i * sizeof(Cell), &cell, sizeof(Cell));
+  }
+}
+
+template <class Cell>
+std::int64_t append_cells(std::span<const float> intensities, const DicomSlice& slice,
+                          const PixelFormat& format, std::span<const std::int32_t> original,
+                          std::vector<std::byte>& into) {
+  const Range range = range_of(format);
+  const std::size_t at = into.size();
+  into.resize(at + intensities.size() * sizeof(Cell));
+  const std::int64_t clipped = store<Cell>(intensities, slice, range, into.data() + at);
+  if (slice.padding) restore_padding<Cell>(original, slice, range, into.data() + at);
+  return clipped;
+}
+
 }  // namespace
 
-std::vector<float> plane_at_slice(const DicomSeries& series, std::span<const float> intensities,
-                                  std::size_t which) {
+std::span<const float> plane_at_slice(const DicomSeries& series, std::span<const float> intensities,
+                                      std::size_t which, std::vector<float>& mixed) {
   const auto plane_size = static_cast<std::size_t>(series.size[0] * series.size[1]);
   const auto plane = [&](std::size_t k) { return intensities.subspan(k * plane_size, plane_size); };
   const double at = series.resampled() ? resampled_index(series, which) : static_cast<double>(which);
   const auto lower = static_cast<std::size_t>(at);
   const double weight = at - static_cast<double>(lower);
-  std::vector<float> result(plane(lower).begin(), plane(lower).end());
-  if (weight == 0) return result;
-  std::ranges::transform(result, plane(lower + 1), result.begin(), [weight](float a, float b) {
+  if (weight == 0) return plane(lower);
+  mixed.resize(plane_size);
+  std::ranges::transform(plane(lower), plane(lower + 1), mixed.begin(), [weight](float a, float b) {
     return static_cast<float>(a + weight * (static_cast<double>(b) - a));
   });
-  return result;
+  return mixed;
 }
 
 std::int64_t append_stored(std::span<const float> intensities, const DicomSlice& slice,
-                           const PixelFormat& format, std::span<const std::int32_t> padding_of,
+                           const PixelFormat& format, std::span<const std::int32_t> original,
                            std::vector<std::byte>& into) {
-  const Range range = range_of(format);
-  const auto size = static_cast<std::size_t>(format.bits_allocated / 8);
-  const auto is_padding = [&](std::size_t i) {
-    return !padding_of.empty() && padding_of[i] >= slice.padding->first &&
-           padding_of[i] <= slice.padding->second;
-  };
-  std::int64_t clipped = 0;
-  std::size_t at = into.size();
-  into.resize(at + intensities.size() * size);
-  for (std::size_t i = 0; i < intensities.size(); ++i, at += size) {
-    std::int64_t stored = is_padding(i) ? padding_of[i] : 0;
-    if (!is_padding(i)) {
-      const double exact = std::nearbyint((intensities[i] - slice.rescale_intercept) / slice.rescale_slope);
-      const double held =
-          std::clamp(exact, static_cast<double>(range.lowest), static_cast<double>(range.highest));
-      clipped += held != exact;
-      stored = beside(static_cast<std::int64_t>(held), slice, range);
-    }
-    std::memcpy(into.data() + at, &stored, size);  // the lowest bytes of it
+  switch (format.bits_allocated * (format.is_signed ? -1 : 1)) {
+    case 8:
+      return append_cells<std::uint8_t>(intensities, slice, format, original, into);
+    case -8:
+      return append_cells<std::int8_t>(intensities, slice, format, original, into);
+    case 16:
+      return append_cells<std::uint16_t>(intensities, slice, format, original, into);
+    case -16:
+      return append_cells<std::int16_t>(intensities, slice, format, original, into);
+    case 32:
+      return append_cells<std::uint32_t>(intensities, slice, format, original, into);
+    default:
+      return append_cells<std::int32_t>(intensities, slice, format, original, into);
   }
-  return clipped;
 }
 
 }  // namespace volsmooth

@@ -10,15 +10,14 @@
 namespace volsmooth {
 
 /// The intensities of slice `which` of the series in a volume of its size: a slice of the volume, or two
-/// mixed where the series was resampled.
-std::vector<float> plane_at_slice(const DicomSeries& series, std::span<const float> intensities,
-                                  std::size_t which);
+/// mixed, in `mixed`, where the series was resampled.
+std::span<const float> plane_at_slice(const DicomSeries& series, std::span<const float> intensities,
+                                      std::size_t which, std::vector<float>& mixed);
 
-/// Stored values of a slice, little-endian, behind `into`. `padding_of`: the stored values that the slice
-/// had, of which those that are padding are written again; empty where it has none. The number of clipped
-/// voxels.
+/// Stored values of a slice, little-endian, behind `into`. `original`: the stored values that a slice with a
+/// padding value had, of which those that are padding are written again. The number of clipped voxels.
 std::int64_t append_stored(std::span<const float> intensities, const DicomSlice& slice,
-                           const PixelFormat& format, std::span<const std::int32_t> padding_of,
+                           const PixelFormat& format, std::span<const std::int32_t> original,
                            std::vector<std::byte>& into);
 
 }  // namespace volsmooth

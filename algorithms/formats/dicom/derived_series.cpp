@@ -9,52 +9,84 @@
 #include "algorithms/formats/dicom/derived_pixels.h"
 #include "algorithms/formats/dicom/refused.h"
 #include "algorithms/formats/dicom/uploaded_files.h"
+#include "algorithms/formats/in_order.h"
 
 namespace volsmooth {
 namespace {
 
 constexpr std::uint32_t kInstanceNumber = 0x00200013, kPixels = 0x7fe00010;
+constexpr std::size_t kLongestPixels = 0xfffffffe;
+
+/// A file with its pixels.
+struct WrittenFile {
+  std::function<void()> hand_over;
+  std::int64_t clipped_voxels = 0;
+};
 
 class SeriesWriter {
  public:
   SeriesWriter(const DicomSeries& series, std::span<const float> intensities, const Derivation& derivation,
                const TakeFile& take)
-      : series_(series),
-        intensities_(intensities),
-        derivation_(derivation),
-        take_(take),
-        uids_(derivation.instance_seed) {}
-
-  DerivedPixels write() {
+      : series_(series), intensities_(intensities), derivation_(derivation), take_(take) {
+    std::map<std::size_t, std::size_t> places;
     for (std::size_t which = 0; which < series_.slices.size(); ++which) {
-      const std::size_t file = series_.slices[which].file;
-      if (!by_file_.contains(file)) order_.push_back(file);
-      by_file_[file].push_back(which);
+      const auto [place, is_new] = places.emplace(series_.slices[which].file, slices_.size());
+      if (is_new) slices_.emplace_back();
+      slices_[place->second].push_back(which);
     }
-    for (std::size_t number = 1; number <= order_.size(); ++number)
-      write_file(number, by_file_[order_[number - 1]]);
-    return counts_;
+    UidSource uids(derivation.instance_seed);
+    for (std::vector<std::size_t>& slices : slices_) {
+      std::ranges::sort(slices, {}, [this](std::size_t which) { return series_.slices[which].frame; });
+      uids_.push_back(uids.next());
+    }
+  }
+
+  DerivedPixels write(const Execution& execution) {
+    DerivedPixels counts;
+    const auto hand_over = [&](std::size_t which, const WrittenFile& file) {
+      file.hand_over();
+      counts.clipped_voxels += file.clipped_voxels;
+      execution.report(static_cast<double>(which + 1) / static_cast<double>(slices_.size()));
+    };
+    make_in_order(
+        slices_.size(), std::min(execution.threads, series_.files->open_at_once()),
+        [this](std::size_t which) { return file(which); }, hand_over);
+    return counts;
   }
 
  private:
-  void write_file(std::size_t number, std::vector<std::size_t>& slices) {
-    std::ranges::sort(slices, {}, [this](std::size_t which) { return series_.slices[which].frame; });
-    const DicomSlice& first = series_.slices[slices.front()];
-    const auto bytes = series_.files->bytes(first.file);
-    if (!bytes) throw Refused{bytes.error()};
+  WrittenFile file(std::size_t which) const {
+    const DicomSlice& first = series_.slices[slices_[which].front()];
+    const auto source = series_.files->open(first.file);
+    if (!source) throw Refused{source.error()};
     gdcm::DataSet set =
-        derived_attributes(public_attributes(*bytes), series_, first, derivation_, uids_.next());
-    set_text(set, kInstanceNumber, gdcm::VR::IS, std::to_string(number));
-    std::vector<std::byte> pixels;
-    for (const std::size_t which : slices) append_slice(which, pixels);
-    if (pixels.size() % 2 == 1) pixels.push_back(std::byte{0});
-    set_bytes(set, kPixels, series_.format.bits_allocated == 8 ? gdcm::VR::OB : gdcm::VR::OW, pixels);
+        derived_attributes(public_attributes(source->bytes), series_, first, derivation_, uids_[which]);
+    set_text(set, kInstanceNumber, gdcm::VR::IS, std::to_string(which + 1));
+    std::vector<std::byte> bytes = part10_file(set);
+    begin_pixels(bytes, slices_[which].size());
+    WrittenFile written;
+    for (const std::size_t slice : slices_[which]) written.clipped_voxels += append_slice(slice, bytes);
+    if (bytes.size() % 2 == 1) bytes.push_back(std::byte{0});
     std::array<char, 32> name{};
-    std::snprintf(name.data(), name.size(), "%04zu.dcm", number);
-    take_(name.data(), part10_file(set));
+    std::snprintf(name.data(), name.size(), "%04zu.dcm", which + 1);
+    written.hand_over = take_(name.data(), bytes);
+    return written;
   }
 
-  void append_slice(std::size_t which, std::vector<std::byte>& pixels) {
+  /// The header of PixelData, which comes last.
+  void begin_pixels(std::vector<std::byte>& file, std::size_t frames) const {
+    const PixelFormat& format = series_.format;
+    const std::size_t length =
+        frames * static_cast<std::size_t>(format.rows * format.columns * (format.bits_allocated / 8));
+    if (length > kLongestPixels)
+      refuse_dicom("volume-too-large",
+                   "Uncompressed, a file of the series would be longer than DICOM can say.");
+    append_long_header(file, kPixels, format.bits_allocated == 8 ? "OB" : "OW",
+                       static_cast<std::uint32_t>(length + length % 2));
+    file.reserve(file.size() + length + 1);
+  }
+
+  std::int64_t append_slice(std::size_t which, std::vector<std::byte>& file) const {
     const DicomSlice& slice = series_.slices[which];
     std::vector<std::int32_t> original;
     if (slice.padding) {
@@ -62,27 +94,26 @@ class SeriesWriter {
       if (!decoded) throw Refused{decoded.error()};
       original = *std::move(decoded);
     }
-    counts_.clipped_voxels +=
-        append_stored(plane_at_slice(series_, intensities_, which), slice, series_.format, original, pixels);
+    std::vector<float> mixed;
+    const auto plane = plane_at_slice(series_, intensities_, which, mixed);
+    return append_stored(plane, slice, series_.format, original, file);
   }
 
   const DicomSeries& series_;
   std::span<const float> intensities_;
   const Derivation& derivation_;
   const TakeFile& take_;
-  UidSource uids_;
-  std::map<std::size_t, std::vector<std::size_t>> by_file_;  ///< slices of each file
-  std::vector<std::size_t> order_;                           ///< of the files
-  DerivedPixels counts_;
+  std::vector<std::vector<std::size_t>> slices_;  ///< of each file, files along the slices
+  std::vector<std::string> uids_;                 ///< of each file
 };
 
 }  // namespace
 
 tl::expected<DerivedPixels, Refusal> write_derived_series(const DicomSeries& series,
                                                           std::span<const float> intensities,
-                                                          const Derivation& derivation,
-                                                          const TakeFile& take) {
-  return or_refusal([&] { return SeriesWriter(series, intensities, derivation, take).write(); });
+                                                          const Derivation& derivation, const TakeFile& take,
+                                                          const Execution& execution) {
+  return or_refusal([&] { return SeriesWriter(series, intensities, derivation, take).write(execution); });
 }
 
 }  // namespace volsmooth

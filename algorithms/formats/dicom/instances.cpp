@@ -46,9 +46,9 @@ tl::expected<std::vector<InstanceIdentity>, Refusal> read_instances(std::span<co
     const auto stored = files->stored(which);
     if (!is_part10(stored))
       return refuse("dicom-no-images", "A part of the body is not a DICOM file; send Part 10 files only.");
-    const auto plain = files->bytes(which);
+    const auto plain = files->open(which);
     if (!plain) return tl::unexpected(plain.error());
-    auto identity = or_refusal([&] { return identity_of(*plain); });
+    auto identity = or_refusal([&] { return identity_of(plain->bytes); });
     if (!identity) return tl::unexpected(identity.error());
     identity->offset = stored.data() - upload.data();
     identity->bytes = std::ssize(stored);

@@ -20,18 +20,17 @@ constexpr std::string_view kRunLengths = "1.2.840.10008.1.2.5";
 template <class Cell>
 std::vector<std::int32_t> values_of(std::span<const std::byte> cells, bool swapped,
                                     const PixelFormat& format) {
-  using Wide = std::conditional_t<std::is_signed_v<Cell>, std::int64_t, std::uint64_t>;
-  const int unused = 64 - format.bits_stored;
+  using Wide = std::conditional_t<std::is_signed_v<Cell>, std::int32_t, std::uint32_t>;
+  const int unused = 32 - format.bits_stored, sign_bit = format.bits_stored - 1;
   std::vector<std::int32_t> values(cells.size() / sizeof(Cell));
   bool clean = true;
   for (std::size_t i = 0; i < values.size(); ++i) {
     Cell cell;
     std::memcpy(&cell, cells.data() + i * sizeof(Cell), sizeof(Cell));
     if (swapped) cell = byte_swapped(cell);
-    const auto raw = static_cast<std::uint64_t>(static_cast<std::make_unsigned_t<Cell>>(cell));
+    const auto raw = static_cast<std::uint32_t>(static_cast<std::make_unsigned_t<Cell>>(cell));
     const auto value = static_cast<Wide>(raw << unused) >> unused;
-    clean &=
-        static_cast<int>(value == static_cast<Wide>(cell)) | static_cast<int>(raw >> format.bits_stored == 0);
+    clean &= static_cast<int>(value == static_cast<Wide>(cell)) | static_cast<int>(raw >> sign_bit >> 1 == 0);
     values[i] = static_cast<std::int32_t>(value);
   }
   if (!clean)
@@ -86,9 +85,9 @@ std::vector<std::int32_t> stored_values(std::span<const std::byte> file, const D
 
 tl::expected<std::vector<std::int32_t>, Refusal> decode_slice(const DicomSeries& series,
                                                               const DicomSlice& slice) {
-  const auto file = series.files->bytes(slice.file);
+  const auto file = series.files->open(slice.file);
   if (!file) return tl::unexpected(file.error());
-  return or_refusal([&] { return stored_values(*file, slice, series.format); });
+  return or_refusal([&] { return stored_values(file->bytes, slice, series.format); });
 }
 
 }  // namespace volsmooth

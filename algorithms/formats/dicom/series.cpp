@@ -9,6 +9,7 @@
 #include "algorithms/formats/dicom/slice_stack.h"
 #include "algorithms/formats/dicom/uploaded_files.h"
 #include "algorithms/formats/dicom_upload.h"
+#include "algorithms/formats/in_order.h"
 
 namespace volsmooth {
 namespace {
@@ -35,17 +36,23 @@ Object object_in(std::span<const std::byte> bytes, std::size_t which, const Read
   return object;
 }
 
-Contents contents_of(UploadedFiles& files, const ReadLimits& limits) {
+Contents contents_of(UploadedFiles& files, const SeriesOptions& options) {
   Contents contents;
-  for (std::size_t which = 0; which < files.count(); ++which) {
-    const auto bytes = files.bytes(which);
-    if (!bytes) throw Refused{bytes.error()};
-    if (is_part10(*bytes)) {
-      contents.objects.push_back(object_in(*bytes, which, limits));
+  const auto look_into = [&](std::size_t which) -> std::optional<Object> {
+    const auto file = files.open(which);
+    if (!file) throw Refused{file.error()};
+    if (!is_part10(file->bytes)) return std::nullopt;
+    return object_in(file->bytes, which, options.limits);
+  };
+  const auto add = [&](std::size_t which, std::optional<Object>&& object) {
+    if (object) {
+      contents.objects.push_back(*std::move(object));
     } else {
       ++contents.other_files;
     }
-  }
+    options.execution.report(static_cast<double>(which + 1) / static_cast<double>(files.count()));
+  };
+  make_in_order(files.count(), std::min(options.execution.threads, files.open_at_once()), look_into, add);
   return contents;
 }
 
@@ -101,7 +108,7 @@ void check_identity(const DicomIdentity& identity) {
 }
 
 DicomSeries series_from(UploadedFiles& files, const SeriesOptions& options) {
-  Contents contents = contents_of(files, options.limits);
+  Contents contents = contents_of(files, options);
   const std::string chosen = pick_series(contents, options.series);
   check_one_patient(contents, chosen);
   std::vector<DicomImage> images;

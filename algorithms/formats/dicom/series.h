@@ -12,16 +12,24 @@
 #include "algorithms/formats/dicom/geometry.h"
 #include "algorithms/formats/read_limits.h"
 #include "algorithms/formats/refusal.h"
+#include "algorithms/progress.h"
 #include "algorithms/volume/geometry.h"
 
 namespace volsmooth {
 
 class UploadedFiles;
 
+/// How work on a series is done, whatever it is.
+struct Execution {
+  int threads = 1;  ///< at most
+  Progress report = no_progress;
+};
+
 struct SeriesOptions {
   std::string series = {};        ///< the Series Instance UID that is meant; may be empty where there is one
   bool resample_uniform = false;  ///< uneven slices are interpolated linearly to even ones
   ReadLimits limits = {};
+  Execution execution = {};
 };
 
 struct ByteRange {
@@ -76,7 +84,7 @@ tl::expected<DicomSeries, Refusal> read_series(std::span<const std::byte> upload
                                                const SeriesOptions& options);
 
 /// Stored values of a slice, rows x columns, column fastest, padding untouched. Refusals: those of
-/// `decode_frame`, and of `UploadedFiles::bytes`.
+/// `decode_frame`, and of `UploadedFiles::open`.
 tl::expected<std::vector<std::int32_t>, Refusal> decode_slice(const DicomSeries& series,
                                                               const DicomSlice& slice);
 

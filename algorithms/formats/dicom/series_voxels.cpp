@@ -8,6 +8,7 @@
 #include "algorithms/formats/dicom/pixels.h"
 #include "algorithms/formats/dicom/refused.h"
 #include "algorithms/formats/dicom/uploaded_files.h"
+#include "algorithms/formats/in_order.h"
 #include "algorithms/formats/voxel_statistics.h"
 #include "algorithms/formats/voxel_type.h"
 #include "algorithms/formats/voxel_warnings.h"
@@ -31,20 +32,31 @@ bool scaled_alike(const DicomSeries& series) {
 /// A slice as it is stored, in intensities.
 struct Plane {
   std::vector<float> intensities;
-  std::vector<std::uint8_t> is_padding;  ///< empty: there is none
+  std::vector<std::uint8_t> is_padding = {};  ///< empty: there is none
+  std::int64_t inexact = 0;                   ///< intensities that float32 cannot hold to half a step
 };
 
 class Decoder {
  public:
   Decoder(const DicomSeries& series, const TakeSlice& take) : series_(series), take_(take) {}
 
-  void decode() {
-    if (!series_.resampled()) {
-      for (std::size_t which = 0; which < series_.slices.size(); ++which) pass_on(which, plane(which));
-      return;
+  void decode(const Execution& execution) {
+    const std::size_t count = series_.resampled() ? series_.blends.size() : series_.slices.size();
+    const auto pass = [&](std::size_t which, const Plane& plane) {
+      pass_on(which, plane);
+      execution.report(static_cast<double>(which + 1) / static_cast<double>(count));
+    };
+    if (series_.resampled()) {  // each of the same two slices as the one before, or the next
+      for (std::size_t which = 0; which < count; ++which) pass(which, blended(series_.blends[which]));
+    } else {
+      const int threads = std::min(execution.threads, series_.files->open_at_once());
+      make_in_order(
+          count, threads, [this](std::size_t which) { return plane(which); },
+          [&](std::size_t which, const Plane& plane) {
+            counts_.inexact += plane.inexact;
+            pass(which, plane);
+          });
     }
-    for (std::size_t which = 0; which < series_.blends.size(); ++which)
-      pass_on(which, blended(series_.blends[which]));
   }
 
   SeriesVoxels facts() const {
@@ -75,16 +87,16 @@ class Decoder {
   }
 
  private:
-  Plane plane(std::size_t which) {
+  Plane plane(std::size_t which) const {
     const DicomSlice& slice = series_.slices[which];
-    const auto file = series_.files->bytes(slice.file);
+    const auto file = series_.files->open(slice.file);
     if (!file) throw Refused{file.error()};
-    const std::vector<std::int32_t> stored = stored_values(*file, slice, series_.format);
-    Plane made{std::vector<float>(stored.size()), {}};
+    const std::vector<std::int32_t> stored = stored_values(file->bytes, slice, series_.format);
+    Plane made{std::vector<float>(stored.size())};
     const double slope = slice.rescale_slope, intercept = slice.rescale_intercept;
     for (std::size_t i = 0; i < stored.size(); ++i)
       made.intensities[i] = static_cast<float>(stored[i] * slope + intercept);
-    count_inexact(slice, stored, made.intensities);
+    made.inexact = count_inexact(slice, stored, made.intensities);
     if (slice.padding) {
       const auto [lowest, highest] = *slice.padding;
       made.is_padding.resize(stored.size());
@@ -97,15 +109,17 @@ class Decoder {
   }
 
   /// float holds every value to half a step while intensities are below 2^23 steps.
-  void count_inexact(const DicomSlice& slice, const std::vector<std::int32_t>& stored,
-                     const std::vector<float>& intensities) {
+  std::int64_t count_inexact(const DicomSlice& slice, const std::vector<std::int32_t>& stored,
+                             const std::vector<float>& intensities) const {
     const double step = std::abs(slice.rescale_slope);
     const double largest = std::ldexp(step, series_.format.bits_stored) + std::abs(slice.rescale_intercept);
-    if (largest <= std::ldexp(step, 23)) return;
+    if (largest <= std::ldexp(step, 23)) return 0;
+    std::int64_t inexact = 0;
     for (std::size_t i = 0; i < stored.size(); ++i) {
       const double exact = stored[i] * slice.rescale_slope + slice.rescale_intercept;
-      counts_.inexact += std::abs(static_cast<double>(intensities[i]) - exact) > step / 2;
+      inexact += std::abs(static_cast<double>(intensities[i]) - exact) > step / 2;
     }
+    return inexact;
   }
 
   const Plane& kept(std::size_t which) {
@@ -113,6 +127,7 @@ class Decoder {
       if (slice == which) return plane;
     std::swap(kept_[0], kept_[1]);  // slices come in order: the one kept longest is not needed again
     kept_[1] = {which, plane(which)};
+    counts_.inexact += kept_[1].second.inexact;
     return kept_[1].second;
   }
 
@@ -120,7 +135,7 @@ class Decoder {
     if (blend.weight == 0) return kept(blend.lower);
     const Plane lower = kept(blend.lower);
     const Plane& upper = kept(blend.upper);
-    Plane made = lower;
+    Plane made{lower.intensities, lower.is_padding};
     if (!lower.is_padding.empty() || !upper.is_padding.empty())
       made.is_padding.resize(made.intensities.size());
     for (std::size_t i = 0; i < made.intensities.size(); ++i) {
@@ -148,10 +163,14 @@ class Decoder {
   }
 
   void add_valid(const Plane& plane) {
-    std::vector<float> valid;
-    for (std::size_t i = 0; i < plane.intensities.size(); ++i)
-      if (!is_padding(plane, i)) valid.push_back(plane.intensities[i]);
-    padded_ += std::ssize(plane.intensities) - std::ssize(valid);
+    std::vector<float> valid(plane.intensities.size());
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < plane.intensities.size(); ++i) {  // without a branch
+      valid[count] = plane.intensities[i];
+      count += plane.is_padding[i] == 0;
+    }
+    padded_ += std::ssize(plane.intensities) - static_cast<std::int64_t>(count);
+    valid.resize(count);
     statistics_.add(valid);
   }
 
@@ -167,10 +186,11 @@ class Decoder {
 
 }  // namespace
 
-tl::expected<SeriesVoxels, Refusal> decode_series(const DicomSeries& series, const TakeSlice& take) {
+tl::expected<SeriesVoxels, Refusal> decode_series(const DicomSeries& series, const TakeSlice& take,
+                                                  const Execution& execution) {
   return or_refusal([&] {
     Decoder decoder(series, take);
-    decoder.decode();
+    decoder.decode(execution);
     return decoder.facts();
   });
 }

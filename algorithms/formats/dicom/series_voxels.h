@@ -23,13 +23,14 @@ struct SeriesVoxels {
   std::vector<std::string> warnings;
 };
 
-/// Takes the intensities of one slice of the volume, slice by slice; where `is_padding` is not 0, they are
-/// those of the padding. It is empty for a slice without.
+/// Takes the intensities of one slice of the volume, slice by slice in order; where `is_padding` is not 0,
+/// they are those of the padding. It is empty for a slice without.
 using TakeSlice = std::function<void(std::int64_t slice, std::span<const float> intensities,
                                      std::span<const std::uint8_t> is_padding)>;
 
 /// Decodes and rescales every slice, each by its own slope, and interpolates where the series was resampled.
 /// Refusals: those of `decode_slice`, dicom-no-pixels where everything is padding.
-tl::expected<SeriesVoxels, Refusal> decode_series(const DicomSeries& series, const TakeSlice& take);
+tl::expected<SeriesVoxels, Refusal> decode_series(const DicomSeries& series, const TakeSlice& take,
+                                                  const Execution& execution = {});
 
 }  // namespace volsmooth

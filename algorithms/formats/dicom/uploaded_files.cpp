@@ -19,6 +19,7 @@ using namespace std::string_view_literals;
 
 constexpr std::int64_t kFreeInflatedBytes = std::int64_t{32} << 20;  // of one file, whatever the ratio
 constexpr std::size_t kMostKeptBytes = std::size_t{256} << 20;
+constexpr std::size_t kMostOpen = 64;
 constexpr std::size_t kInflatedAtOnce = std::size_t{1} << 20;
 
 std::span<const std::byte> bytes_of(std::string_view text) {
@@ -82,55 +83,70 @@ tl::expected<UploadedFiles, Refusal> UploadedFiles::in(std::span<const std::byte
   UploadedFiles files;
   files.limits_ = limits;
   if (is_part10(upload)) {
-    files.entries_.push_back({.stored = upload});
+    files.add(upload);
   } else if (looks_like_zip(upload)) {
     auto directory = read_zip_directory(upload, zip_limits(limits));
     if (!directory) return tl::unexpected(directory.error());
-    for (ZipEntry& entry : *directory)
-      files.entries_.push_back({.stored = upload, .packed = std::move(entry)});
+    for (ZipEntry& entry : *directory) files.add(upload, std::move(entry));
   } else {
     const auto parts = multipart_parts(upload);
     if (!parts) return tl::unexpected(parts.error());
-    for (const auto part : *parts) files.entries_.push_back({.stored = part});
+    for (const auto part : *parts) files.add(part);
   }
   return files;
 }
 
-tl::expected<std::span<const std::byte>, Refusal> UploadedFiles::bytes(std::size_t which) {
+void UploadedFiles::add(std::span<const std::byte> stored, std::optional<ZipEntry> packed) {
+  largest_bytes_ = std::max(largest_bytes_, packed ? packed->size : stored.size());
+  entries_.push_back({.stored = stored, .packed = std::move(packed)});
+}
+
+int UploadedFiles::open_at_once() const {
+  return static_cast<int>(std::clamp<std::size_t>(kMostKeptBytes / largest_bytes_, 1, kMostOpen));
+}
+
+tl::expected<OpenedFile, Refusal> UploadedFiles::open(std::size_t which) {
   Entry& entry = entries_.at(which);
-  if (!entry.opened.empty()) return entry.opened;
-  std::vector<std::byte> unpacked;
-  std::span<const std::byte> file = entry.stored;
+  const std::lock_guard unpacking(*entry.unpacking);
+  {
+    const std::lock_guard keeping(*keeping_);
+    if (entry.kept) return *entry.kept;
+  }
+  auto file = unpacked(entry);
+  if (file) keep(entry, *file);
+  return file;
+}
+
+tl::expected<OpenedFile, Refusal> UploadedFiles::unpacked(const Entry& entry) const {
+  OpenedFile file{entry.stored};
+  const auto take = [&file](std::vector<std::byte>&& bytes) {
+    file.unpacked = std::make_shared<const std::vector<std::byte>>(std::move(bytes));
+    file.bytes = *file.unpacked;
+  };
   if (entry.packed) {
     auto content = unpack(entry.stored, *entry.packed);
     if (!content) return tl::unexpected(content.error());
-    unpacked = *std::move(content);
-    file = unpacked;
+    take(*std::move(content));
   }
-  if (is_part10(file)) {
-    auto plain = or_refusal([&] { return inflated_if_deflated(file, limits_); });
+  if (is_part10(file.bytes)) {
+    auto plain = or_refusal([&] { return inflated_if_deflated(file.bytes, limits_); });
     if (!plain) return tl::unexpected(plain.error());
-    if (!plain->empty()) {
-      unpacked = *std::move(plain);
-      file = unpacked;
-    }
+    if (!plain->empty()) take(*std::move(plain));
   }
-  if (!unpacked.empty()) keep(which, std::move(unpacked));
-  entry.opened = file;
   return file;
 }
 
 /// Makes room for it by giving up all others.
-void UploadedFiles::keep(std::size_t which, std::vector<std::byte> unpacked) {
-  if (kept_bytes_ + unpacked.size() > kMostKeptBytes) {
-    for (Entry& entry : entries_) {
-      if (!entry.unpacked.empty()) entry.opened = {};
-      entry.unpacked = {};
-    }
+void UploadedFiles::keep(Entry& entry, const OpenedFile& file) {
+  const std::lock_guard keeping(*keeping_);
+  const std::size_t bytes = file.unpacked ? file.unpacked->size() : 0;
+  if (kept_bytes_ + bytes > kMostKeptBytes) {
+    for (Entry& other : entries_)
+      if (other.kept && other.kept->unpacked) other.kept.reset();
     kept_bytes_ = 0;
   }
-  kept_bytes_ += unpacked.size();
-  entries_[which].unpacked = std::move(unpacked);
+  kept_bytes_ += bytes;
+  entry.kept = file;
 }
 
 }  // namespace volsmooth

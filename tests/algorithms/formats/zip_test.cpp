@@ -488,7 +488,7 @@ ByteVector written(const Contents& contents) {
   ByteVector file;
   ZipWriter writer(
       [&](std::span<const std::byte> bytes) { file.insert(file.end(), bytes.begin(), bytes.end()); });
-  for (const auto& [name, content] : contents) writer.add(name, content);
+  for (const auto& [name, content] : contents) writer.add(name, pack(content));
   writer.finish();
   return file;
 }

@@ -33,7 +33,7 @@ tl::expected<nlohmann::json, Problem> run_script(const std::string& body,
   IngestOrder order{.command = "inspect"};
   order.options = limits();
   order.patience = patience;
-  return run_ingest(script(folder, body), order, [] {});
+  return run_ingest(script(folder, body), order, no_progress);
 }
 
 TEST(IngestChild, AnswerIsWhatTheChildWrites) {
@@ -63,7 +63,7 @@ TEST(IngestChild, WithoutASandboxItIsOurFault) {
 TEST(IngestChild, WithoutAProgramItIsOurFault) {
   IngestOrder order{.command = "inspect"};
   order.options = limits();
-  EXPECT_THROW((void)run_ingest("/nowhere/volsmooth-ingest", order, [] {}), std::system_error);
+  EXPECT_THROW((void)run_ingest("/nowhere/volsmooth-ingest", order, no_progress), std::system_error);
 }
 
 TEST(IngestChild, IsKilledWhenItTakesTooLong) {
@@ -78,7 +78,7 @@ TEST(IngestChild, IsKilledWhenTheWorkIsCancelled) {
   IngestOrder order{.command = "inspect"};
   order.options = limits();
   const auto program = script(folder, "echo $$ > " + pid_file.string() + "; exec sleep 60");
-  const auto cancel = [&] {
+  const auto cancel = [&](double) {
     if (std::ifstream(pid_file).peek() != EOF) throw Cancelled();
   };
   EXPECT_THROW((void)run_ingest(program, order, cancel), Cancelled);
@@ -89,7 +89,22 @@ TEST(IngestChild, IsKilledWhenTheWorkIsCancelled) {
 
 TEST(IngestChild, HasNoDescriptorButItsOwn) {
   const auto answer = run_script(R"(n=$(ls /proc/self/fd | wc -l); echo '{"volume": {"open": '$n'}}')");
-  EXPECT_LE(answer->at("volume").at("open"), 7) << "0 to 5, and the one that lists them";
+  EXPECT_LE(answer->at("volume").at("open"), 8) << "0 to 6, and the one that lists them";
+}
+
+/// 0.5, 2, -1 and not a number, as doubles.
+TEST(IngestChild, ProgressIsToldAndNotBelieved) {
+  const std::string half = R"(\0\0\0\0\0\0\340\077)", two = R"(\0\0\0\0\0\0\0\100)",
+                    less = R"(\0\0\0\0\0\0\360\277)", none = R"(\0\0\0\0\0\0\370\177)";
+  for (const auto& [bytes, expected] : {std::pair{half, 0.5}, {two, 1.0}, {less, 0.0}, {none, 0.0}}) {
+    const ScratchFolder folder;
+    IngestOrder order{.command = "inspect"};
+    order.options = limits();
+    double told = -1;
+    const auto program = script(folder, "printf '" + bytes + "' >&6; sleep 0.4; echo '{}'");
+    EXPECT_TRUE(run_ingest(program, order, [&](double fraction) { told = fraction; }));
+    EXPECT_EQ(told, expected) << bytes;
+  }
 }
 
 class IngestedUploads : public testing::TestWithParam<test::DicomUpload> {};

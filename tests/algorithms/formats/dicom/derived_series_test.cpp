@@ -102,13 +102,18 @@ TEST(DerivedSeries, ClipsAndCountsWhatTheStoredValuesCannotHold) {
   EXPECT_EQ(derived.again.voxels[2], source.voxels[2]);
 }
 
-TEST(DerivedSeries, PutsPaddingBackAndMakesNoMore) {
+/// The first five pixels of every slice are padding, -2000 as it is stored.
+std::vector<DicomDataset> padded_series() {
   auto series = test::series_of({});
   for (DicomDataset& set : series) {
     set.ss(0x00280120, -2000);
     for (std::size_t byte = 0; byte < 10; byte += 2) set[0x7fe00010].bytes.replace(byte, 2, "\x30\xf8");
   }
-  const SeriesInMemory source = read(series);
+  return series;
+}
+
+TEST(DerivedSeries, PutsPaddingBackAndMakesNoMore) {
+  const SeriesInMemory source = read(padded_series());
   ASSERT_EQ(source.facts.padded_voxels, 5 * 8);
   std::vector<float> voxels(source.voxels.size(), 100);
   voxels[20] = -3024;  // stored, it would be the padding value
@@ -201,7 +206,7 @@ TEST(DerivedSeries, SaysThatItsSourceWasCompressedWithLoss) {
   DicomSlice slice = source.series.slices[0];
   slice.transfer_syntax_uid = "1.2.840.10008.1.2.4.91";
   slice.pixels = {{0, 40}, {40, 24}};  // of 16 x 16 x 2 bytes
-  const auto bytes = source.series.files->bytes(slice.file).value();
+  const auto bytes = source.series.files->open(slice.file).value().bytes;
   const auto set =
       derived_attributes(public_attributes(bytes), source.series, slice, test::some_derivation(), "1.2");
   EXPECT_EQ(text_of(set, 0x00282110), "01");
@@ -279,6 +284,29 @@ TEST(Uids, CarryIntoTheNextByte) {
   UidSource uids(seed);
   EXPECT_EQ(uids.next(), "2.25.302240678275694148452607");  // ...00ff
   EXPECT_EQ(uids.next(), "2.25.302240678275694148452608");  // ...0100
+}
+
+TEST(DerivedSeries, IsTheSameHoweverManyThreadsWorkAtIt) {
+  for (const std::string& upload :
+       {test::zip_of(test::files_of(padded_series())), test::dicom_file(test::enhanced_of({}))}) {
+    const SeriesOptions alone, together{.execution = {.threads = 4}};
+    const SeriesInMemory one = test::read_into_memory(upload, alone);
+    const SeriesInMemory many = test::read_into_memory(upload, together);
+    EXPECT_EQ(one.voxels, many.voxels);
+    EXPECT_EQ(one.facts.padded_voxels, many.facts.padded_voxels);
+    EXPECT_EQ(one.facts.warnings, many.facts.warnings);
+    EXPECT_EQ(test::derive(one, one.voxels, alone).files, test::derive(many, many.voxels, together).files);
+  }
+}
+
+TEST(DerivedSeries, TellsHowFarItIs) {
+  std::vector<double> told;
+  const SeriesOptions options{.execution = {.report = [&](double fraction) { told.push_back(fraction); }}};
+  const SeriesInMemory source =
+      test::read_into_memory(test::zip_of(test::files_of(padded_series())), options);
+  (void)test::derive(source, source.voxels, options);
+  EXPECT_EQ(std::ranges::count(told, 1.0), 5) << "read and decoded, derived, read and decoded again";
+  EXPECT_GT(std::ranges::count(told, 0.5), 2);
 }
 
 }  // namespace

@@ -51,7 +51,7 @@ class RealDicom : public testing::Test {
 /// The values of every frame of one file, whether or not they make a volume.
 std::vector<std::int32_t> pixels_of(const std::string& file) {
   auto files = UploadedFiles::in(bytes_of(file), {}).value();
-  const auto bytes = files.bytes(0).value();
+  const auto bytes = files.open(0).value().bytes;
   const WalkedFile walked(bytes);
   // Without geometry a frame is no image for the reader: here its pixels alone count.
   DicomIdentity identity = identity_of(walked);
