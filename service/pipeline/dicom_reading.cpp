@@ -75,11 +75,11 @@ VolumeDescription description_from(const Json& volume) {
   return description;
 }
 
-/// Reads a memory file from front to back and gives back its memory on the way, so that no byte is held
-/// twice.
+/// Reads a memory file from front to back.
 class MemoryReader {
  public:
-  explicit MemoryReader(const Descriptor& file) : file_(file) {}
+  /// `spend`: gives back its memory on the way, so that no byte is held twice.
+  MemoryReader(const Descriptor& file, bool spend) : file_(file), spend_(spend) {}
 
   void read(std::span<std::byte> out, const Progress& report) {
     constexpr std::size_t kChunk = 16 * kMiB;
@@ -87,8 +87,7 @@ class MemoryReader {
       const auto part = out.subspan(done, std::min(kChunk, out.size() - done));
       const ssize_t got = ::pread(file_.get(), part.data(), part.size(), at_);
       check(got > 0, "the decoded voxels");
-      ::fallocate(file_.get(), FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, at_,
-                  got);  // spares memory if it can
+      if (spend_) ::fallocate(file_.get(), FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, at_, got);
       at_ += got;
       done += static_cast<std::size_t>(got);
       report(static_cast<double>(done) / static_cast<double>(out.size()));
@@ -97,6 +96,7 @@ class MemoryReader {
 
  private:
   const Descriptor& file_;
+  const bool spend_;
   off_t at_ = 0;
 };
 
@@ -143,8 +143,10 @@ tl::expected<VolumeDescription, Problem> describe_dicom(const std::filesystem::p
 }
 
 tl::expected<InputVolume, Problem> read_dicom(const std::filesystem::path& file, const StoredVolume& stored,
-                                              const PipelineLimits& limits, const Progress& report) {
-  const Descriptor voxels = memory_file("voxels");
+                                              const PipelineLimits& limits, const Progress& report,
+                                              const Descriptor* kept) {
+  const Descriptor own = kept == nullptr ? memory_file("voxels") : Descriptor();
+  const Descriptor& voxels = kept == nullptr ? own : *kept;
   const std::int64_t count = voxel_count(stored.facts.size);
   constexpr double kDecoded = 0.8;
   const auto answer = ask("decode", open_upload(file), voxels.get(), count, stored.options, limits,
@@ -155,7 +157,7 @@ tl::expected<InputVolume, Problem> read_dicom(const std::filesystem::path& file,
   if (voxel_count(input.description.size) != count)
     throw std::runtime_error("a volume of another size was decoded");
   input.volume = make_volume(input.description.size, input.description.map);
-  MemoryReader reader(voxels);
+  MemoryReader reader(voxels, kept == nullptr);
   reader.read(std::as_writable_bytes(voxels_of(*input.volume)), part_of(report, kDecoded, 1));
   if (const auto padded = decoded.at("padded_voxels").get<std::size_t>(); padded > 0) {
     auto bits = read_values<std::uint8_t>(reader, (static_cast<std::size_t>(count) + 7) / 8);

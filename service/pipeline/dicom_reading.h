@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "service/pipeline/descriptor.h"
 #include "service/pipeline/reading.h"
 
 namespace volsmooth {
@@ -13,12 +14,14 @@ bool is_dicom_upload(const std::filesystem::path& file);
 nlohmann::json ingest_options(const UploadOptions& options, const PipelineLimits& limits,
                               std::int64_t upload_bytes, std::int64_t voxels);
 
-/// As `describe_volume` and `read_volume`, by volsmooth-ingest.
+/// As `describe_volume` and `read_volume`, by volsmooth-ingest. `kept`: an empty memory file that the voxels
+/// are decoded to and that keeps its memory.
 tl::expected<VolumeDescription, Problem> describe_dicom(const std::filesystem::path& file,
                                                         const UploadOptions& options,
                                                         const PipelineLimits& limits, const Progress& report);
 tl::expected<InputVolume, Problem> read_dicom(const std::filesystem::path& file, const StoredVolume& stored,
-                                              const PipelineLimits& limits, const Progress& report);
+                                              const PipelineLimits& limits, const Progress& report,
+                                              const Descriptor* kept = nullptr);
 
 /// Which instances a body of DICOM files holds, by volsmooth-ingest.
 tl::expected<std::vector<ArrivedInstance>, Problem> list_instances(const std::filesystem::path& file,

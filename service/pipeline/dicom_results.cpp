@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <sys/random.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <array>
 #include <cerrno>
@@ -102,6 +103,11 @@ std::string label_of(const Mesh& mesh) {
 
 }  // namespace
 
+const Descriptor& DicomResults::voxel_memory() {
+  if (!voxels_) voxels_ = memory_file("voxels");
+  return voxels_;
+}
+
 void DicomResults::begin_method(const std::string& method, const ParameterValues& parameters) {
   method_ = method;
   description_ = described(method, parameters);
@@ -112,8 +118,11 @@ void DicomResults::begin_method(const std::string& method, const ParameterValues
 std::int64_t DicomResults::write_series(const std::filesystem::path& file, const Volume& volume,
                                         const Progress& report) {
   ++series_;
-  const Descriptor input = memory_file("voxels");
+  const Descriptor& input = voxel_memory();
   const auto voxels = voxels_of(volume);
+  check(::ftruncate(input.get(), static_cast<off_t>(voxels.size_bytes())) == 0 &&
+            ::lseek(input.get(), 0, SEEK_SET) == 0,
+        "the input for volsmooth-ingest");
   append(input, voxels.data(), voxels.size_bytes());
   const Json options = begin_object("dicom-series", random_seed());
   return derive(file, options, input.get(), report).at("clipped_voxels").get<std::int64_t>();

@@ -9,6 +9,7 @@
 #include "algorithms/surface/mesh.h"
 #include "algorithms/volume/volume.h"
 #include "service/jobs/job.h"
+#include "service/pipeline/descriptor.h"
 #include "service/pipeline/pipeline.h"
 
 namespace volsmooth {
@@ -23,6 +24,9 @@ struct DeriveRefused {
 class DicomResults {
  public:
   DicomResults(const ComputeTask& task, const PipelineLimits& limits) : task_(task), limits_(limits) {}
+
+  /// A memory file for voxels, which `write_series` uses as well: memory that is there is quick to write to.
+  const Descriptor& voxel_memory();
 
   /// The objects that follow are made by this method; `parameters` are the resolved ones.
   void begin_method(const std::string& method, const ParameterValues& parameters);
@@ -43,6 +47,7 @@ class DicomResults {
 
   const ComputeTask& task_;
   const PipelineLimits& limits_;
+  Descriptor voxels_;
   std::string method_, description_, mesh_series_seed_;
   int series_ = 0, mesh_series_ = 0, meshes_ = 0;  ///< numbers given out
 };

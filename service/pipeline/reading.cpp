@@ -64,8 +64,9 @@ tl::expected<VolumeDescription, Problem> describe_volume(const std::filesystem::
 }
 
 tl::expected<InputVolume, Problem> read_volume(const std::filesystem::path& file, const StoredVolume& stored,
-                                               const PipelineLimits& limits, const Progress& report) {
-  if (is_dicom_upload(file)) return read_dicom(file, stored, limits, report);
+                                               const PipelineLimits& limits, const Progress& report,
+                                               const Descriptor* kept) {
+  if (is_dicom_upload(file)) return read_dicom(file, stored, limits, report, kept);
   return read_nifti(file, read_options(stored.options, limits), report)
       .map([](LoadedVolume&& loaded) {
         return InputVolume{std::move(loaded.description), loaded.volume};

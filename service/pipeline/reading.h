@@ -7,6 +7,7 @@
 
 #include "algorithms/formats/nifti.h"
 #include "service/jobs/job.h"
+#include "service/pipeline/descriptor.h"
 #include "service/pipeline/pipeline.h"
 
 namespace volsmooth {
@@ -35,11 +36,13 @@ struct InputVolume {
 };
 
 /// Verifies an uploaded file without holding its voxels, and reads it; its content says of what format it is.
+/// `kept`: where the voxels of DICOM pass through, if that memory is to be used again.
 tl::expected<VolumeDescription, Problem> describe_volume(const std::filesystem::path& file,
                                                          const UploadOptions& options,
                                                          const PipelineLimits& limits,
                                                          const Progress& report);
 tl::expected<InputVolume, Problem> read_volume(const std::filesystem::path& file, const StoredVolume& stored,
-                                               const PipelineLimits& limits, const Progress& report);
+                                               const PipelineLimits& limits, const Progress& report,
+                                               const Descriptor* kept = nullptr);
 
 }  // namespace volsmooth

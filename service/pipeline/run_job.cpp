@@ -50,7 +50,8 @@ class JobRun {
 
   tl::expected<std::vector<Result>, Problem> run() {
     auto loaded = clock_.run("read", kReadCost * voxels_, [&](const Progress& progress) {
-      return read_volume(task_.volume_file, task_.volume, limits_, progress);
+      const Descriptor* const kept = wanted("dicom-series") ? &dicom_.voxel_memory() : nullptr;
+      return read_volume(task_.volume_file, task_.volume, limits_, progress, kept);
     });
     if (!loaded) return tl::unexpected(loaded.error());
     description_ = std::move(loaded->description);
