@@ -18,6 +18,7 @@
 #include "service/http/server.h"
 #include "service/jobs/job_service.h"
 #include "service/jobs/machine.h"
+#include "service/pacs/dimse_listener.h"
 #include "service/pacs/pacs.h"
 #include "service/pacs/presets.h"
 #include "service/pipeline/pipeline.h"
@@ -31,6 +32,7 @@ struct Options {
   ServerSettings server;
   JobServiceSettings jobs;
   std::filesystem::path ingest_program;
+  std::string dimse_listen;
   std::string log_level = "info";
   bool ephemeral = false;
   // Of the configuration file.
@@ -46,6 +48,10 @@ void declare(CLI::App& app, Options& options) {
   app.add_option("--listen", options.server.listen, "ADDRESS:PORT (port 0: any free one) or unix:PATH")
       ->envname("VOLSMOOTH_LISTEN")
       ->capture_default_str();
+  app.add_option(
+         "--dimse-listen", options.dimse_listen,
+         "ADDRESS:PORT where devices send to the presets by C-STORE (port 0: any free one); default: nowhere")
+      ->envname("VOLSMOOTH_DIMSE_LISTEN");
   app.add_option("--data", options.jobs.data_dir,
                  "Folder of the volumes, jobs and results; made when missing")
       ->envname("VOLSMOOTH_DATA")
@@ -81,7 +87,7 @@ void declare(CLI::App& app, Options& options) {
       ->envname("VOLSMOOTH_HOST_NAME");
   app.add_flag(
          "--allow-open-network", options.server.allow_open_network,
-         "Allows --listen on an address that others than this machine reach. There is no access control")
+         "Allows to listen on addresses that others than this machine reach. There is no access control")
       ->envname("VOLSMOOTH_ALLOW_OPEN_NETWORK");
   app.add_flag("--ephemeral", options.ephemeral,
                "Removes the data folder at the end; it must be new or empty")
@@ -121,6 +127,21 @@ sigset_t end_signals() {
   return set;
 }
 
+/// Devices speak DIMSE with it; what comes is kept by the jobs.
+void listen_for_devices(const Options& options, JobService& jobs, std::optional<DimseListener>& listener) {
+  if (options.dimse_listen.empty()) return;
+  Inbox inbox;
+  inbox.begin = [&jobs] { return jobs.begin_upload(std::nullopt); };
+  inbox.keep = [&jobs](const std::string& preset, IncomingFile file) {
+    return jobs.receive(preset, std::move(file));
+  };
+  inbox.max_bytes = options.jobs.max_upload_bytes;
+  listener.emplace(DimseListener::Settings{options.dimse_listen, options.server.allow_open_network,
+                                           presets_by_title(options.presets), log_event},
+                   std::move(inbox));
+  log_event("dimse-ready", "listening for DICOM associations on " + listener->address());
+}
+
 void serve(const Options& options) {
   std::optional<EphemeralFolder> folder;
   if (options.ephemeral) folder.emplace(options.jobs.data_dir);
@@ -140,6 +161,8 @@ void serve(const Options& options) {
     ::kill(::getpid(), SIGTERM);
   });
   Server server(options.server, {jobs, metrics});
+  std::optional<DimseListener> listener;
+  listen_for_devices(options, jobs, listener);
   jobs.start();
   log_event("ready", "volsmoothd " VOLSMOOTH_VERSION " listening on " + server.address());
 
@@ -148,6 +171,7 @@ void serve(const Options& options) {
   sigwait(&signals, &received);
   log_event("stopping", received == SIGTERM ? "SIGTERM" : "SIGINT");
   jobs.stop();  // first: those whose uploads are being verified still get an answer
+  listener.reset();
   server.stop();
   if (store_lost)
     throw std::runtime_error("nobody knows whether a commit stands; the next start finds out and recovers");

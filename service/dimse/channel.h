@@ -22,8 +22,10 @@ namespace volsmooth {
 // "result", "source", "reason"} with the numbers of PS3.8, 9.3.4.
 //
 // receive: the child, whose descriptor 3 is an accepted connection, says {"called", "calling"} and gets
-// {"reject": 0 or source << 8 | reason}. Then, for each instance that comes, the daemon gets its bytes and
-// {"sop_class", "sop_instance", "whole"}; it answers {"status": for the C-STORE response} if it was whole.
+// {"reject": 0 or source << 8 | reason}. Then, for each instance that came whole, the daemon gets its bytes
+// and
+// {"sop_class", "sop_instance"}, and answers {"status": for the C-STORE response}. {"released": true} is the
+// good end; without it the peer broke off.
 
 constexpr int kChannelDescriptor = 0, kConnectionDescriptor = 3;
 

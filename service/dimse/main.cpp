@@ -29,10 +29,10 @@ void prepare() {
 
 int main(int argc, char** argv) {
   const std::string_view command = argc == 2 ? argv[1] : "";
-  if (command != "send") return kUsageError;
+  if (command != "send" && command != "receive") return kUsageError;
   try {
     prepare();
-    volsmooth::send_instances();
+    command == "send" ? volsmooth::send_instances() : volsmooth::receive_instances();
   } catch (const std::exception&) {
     ::_exit(kGivenUp);
   }

@@ -39,6 +39,7 @@ struct Preset {
   JobOrder order;  ///< without its volume
   /// A series is whole when nothing of it has arrived for so long.
   std::chrono::milliseconds quiet = std::chrono::seconds(10);
+  std::string aet = {};  ///< the AE title that devices call it by; empty: none
 };
 
 /// The DICOM nodes and presets that the configuration names, handed to the service by main as plain functions

@@ -1,9 +1,12 @@
 #include "service/pacs/presets.h"
 
+#include <algorithm>
+#include <cctype>
 #include <stdexcept>
 
 #include "service/jobs/ids.h"
 #include "service/jobs/job_json.h"
+#include "service/pacs/ae_title.h"
 
 namespace volsmooth {
 namespace {
@@ -33,18 +36,30 @@ std::chrono::milliseconds quiet_in(const std::string& name, const json& seconds)
   return std::chrono::milliseconds(static_cast<std::int64_t>(1000 * seconds.get<double>()));
 }
 
+std::string title_from(std::string name) {
+  std::ranges::transform(name, name.begin(), [](char c) {
+    return static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+  });
+  return is_ae_title(name) ? name : "";
+}
+
 Preset preset_from(const std::string& name, const json& configured) {
   if (!is_id_shaped(name)) fail(name, "a name has 1 to 64 letters, digits, '-' and '_'");
   if (!configured.is_object()) fail(name, "must be an object with 'job' and 'destination'");
   Preset preset{name, order_in(name, configured.value("job", json::object()))};
+  preset.aet = title_from(name);
   for (const auto& [member, value] : configured.items()) {
     if (member == "destination") {
       if (!value.is_string()) fail(name, "'destination' must be the name of a node");
       preset.order.destination = value;
     } else if (member == "quiet_seconds") {
       preset.quiet = quiet_in(name, value);
+    } else if (member == "aet") {
+      if (!value.is_string() || !is_ae_title(value.get_ref<const std::string&>()))
+        fail(name, std::string("'aet' must be ") + kAeTitleRule);
+      preset.aet = value;
     } else if (member != "job") {
-      fail(name, "'" + member + "' is not known; known are job, destination and quiet_seconds");
+      fail(name, "'" + member + "' is not known; known are job, destination, quiet_seconds and aet");
     }
   }
   return preset;

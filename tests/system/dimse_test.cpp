@@ -1,9 +1,10 @@
-// C-STORE to and from real peers: Orthanc and DCMTK's storescu.
+// C-STORE to and from real peers: Orthanc and DCMTK's storescu; and hostile ones.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <list>
 #include <optional>
 
 #include "tests/system/orthanc.h"
@@ -12,6 +13,54 @@ namespace volsmooth::test {
 namespace {
 
 const char* const kStoreUser = "/usr/bin/storescu";
+
+/// A peer that says what it likes.
+class RawPeer {
+ public:
+  explicit RawPeer(int port) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(static_cast<std::uint16_t>(port));
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    if (connect(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
+      throw std::runtime_error("connect failed");
+  }
+  RawPeer(const RawPeer&) = delete;
+  ~RawPeer() { close(socket_); }
+
+  void say(const std::string& bytes) const { (void)send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL); }
+  /// What comes until the other side ends it, for half a minute at most.
+  std::string hear() const {
+    const timeval patience{30, 0};
+    setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+    std::string heard;
+    char buffer[4096];
+    for (ssize_t got; (got = recv(socket_, buffer, sizeof buffer, 0)) > 0;)
+      heard.append(buffer, static_cast<std::size_t>(got));
+    return heard;
+  }
+
+ private:
+  const int socket_ = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+};
+
+/// An item or a PDU: a type, a byte of nothing, and the length of what follows, the highest byte first.
+std::string tlv(char type, int length_bytes, const std::string& content) {
+  std::string text{type, '\0'};
+  for (int i = length_bytes; i-- > 0;) text += static_cast<char>(content.size() >> (8 * i) & 0xFF);
+  return text + content;
+}
+
+/// An A-ASSOCIATE-RQ for HEAD that proposes Verification (DICOM PS3.8, 9.3.2).
+std::string association_request() {
+  const auto title = [](std::string text) { return text.append(16 - text.size(), ' '); };
+  const std::string context =
+      std::string("\1\0\0\0", 4) + tlv(0x30, 2, "1.2.840.10008.1.1") + tlv(0x40, 2, "1.2.840.10008.1.2");
+  const std::string maximum = tlv(0x51, 2, std::string("\0\0\x40\0", 4)) + tlv(0x52, 2, "1.2.3.4");
+  return tlv(1, 4,
+             std::string("\0\1\0\0", 4) + title("HEAD") + title("RAW") + std::string(32, '\0') +
+                 tlv(0x10, 2, "1.2.840.10008.3.1.1.1") + tlv(0x20, 2, context) + tlv(0x50, 2, maximum));
+}
 
 /// An archive and a daemon that knows it: by DICOMweb as "archive", by DIMSE as "cstore", by a wrong AE title
 /// as "stranger".
@@ -38,15 +87,20 @@ class Dimse : public testing::Test {
     const auto dimse = [&](const std::string& aet) {
       return json{{"dimse", {{"host", "127.0.0.1"}, {"port", archive_->dimse_port()}, {"aet", aet}}}};
     };
-    return {{"nodes",
+    return {{"dimse-listen", "127.0.0.1:" + std::to_string(port_)},
+            {"nodes",
              {{"archive", {{"dicomweb", archive_->address()}}},
               {"cstore", dimse("ARCHIVE")},
-              {"stranger", dimse("STRANGER")}}}};
+              {"stranger", dimse("STRANGER")}}},
+            {"presets",
+             {{"head",
+               {{"job", {{"isovalues", json::array()}}}, {"destination", "cstore"}, {"quiet_seconds", 2}}}}}};
   }
 
   /// What storescu ends with.
-  int store(int port, const std::string& called, const std::vector<std::string>& files) const {
-    std::vector<std::string> command{kStoreUser, "-aec", called, "127.0.0.1", std::to_string(port)};
+  int store(int port, const std::string& called, const std::vector<std::string>& files,
+            const std::string& option = "-v") const {
+    std::vector<std::string> command{kStoreUser, option, "-aec", called, "127.0.0.1", std::to_string(port)};
     command.insert(command.end(), files.begin(), files.end());
     return ChildProcess(command, folder_ / "storescu", folder_ / "storescu").wait();
   }
@@ -72,11 +126,38 @@ class Dimse : public testing::Test {
     return job.at("delivery");
   }
 
+  /// Of the job that a preset makes: once it has succeeded and its results are delivered.
+  json delivery_of_preset() const {
+    std::string id;
+    const bool there = eventually([&] {
+      const json jobs = client().get("/v1/jobs").at("jobs");
+      if (!jobs.empty()) id = jobs.at(0).at("id");
+      return !jobs.empty();
+    });
+    if (!there) throw std::runtime_error("no job came");
+    if (const json job = client().wait(id); job.at("state") != "succeeded")
+      throw std::runtime_error("the job ended as " + job.dump());
+    return delivery(id, is_delivered);
+  }
+
+  /// The volsmooth-dimse that serves the only association.
+  pid_t child() const {
+    pid_t found = -1;
+    eventually([&] {
+      for (const auto& task :
+           std::filesystem::directory_iterator("/proc/" + std::to_string(daemon_->pid()) + "/task"))
+        if (std::ifstream in(task.path() / "children"); in >> found) return true;
+      return false;
+    });
+    return found;
+  }
+
   static bool is_delivered(const json& delivery) { return delivery.at("state") == "delivered"; }
 
   TemporaryDirectory folder_;
   std::vector<DicomDataset> datasets_ = series_of(ball_series());
   std::vector<std::string> files_;
+  const int port_ = free_port();
   std::optional<Orthanc> archive_;
   std::optional<Daemon> daemon_;
   std::string study_, series_;
@@ -130,6 +211,114 @@ TEST_F(Dimse, APeerIsNoSource) {
   const HttpResponse answer = client().try_submit(order("cstore", "cstore"));
   EXPECT_EQ(answer.status, 422);
   EXPECT_EQ(answer.document().at("choices"), json({"archive"}));
+}
+
+/// An older device: the AE title that it calls is the preset.
+TEST_F(Dimse, RunsThePresetThatADeviceCalls) {
+  ASSERT_EQ(store(port_, "HEAD", files_), 0) << content_of(folder_ / "storescu");
+  EXPECT_EQ(delivery_of_preset().at("stored"), datasets_.size());
+  const auto derived = derived_series_in(*archive_, study_);
+  ASSERT_EQ(derived.size(), 1u);
+  EXPECT_EQ(derived.begin()->second, std::ssize(datasets_));
+  EXPECT_THAT(daemon_->log(), testing::HasSubstr("from STORESCU to HEAD: 12 stored, 0 refused, released"));
+  EXPECT_THAT(daemon_->log(), testing::Not(testing::HasSubstr("PLANTED")));
+}
+
+TEST_F(Dimse, ADeathOfTheDaemonLosesNothingThatWasAcknowledged) {
+  ASSERT_EQ(store(port_, "HEAD", files_, "-xi"), 0);
+  daemon_->kill();
+  daemon_->start();
+  EXPECT_EQ(delivery_of_preset().at("stored"), datasets_.size());
+  EXPECT_EQ(client().get("/v1/jobs").at("jobs").size(), 1u);
+}
+
+TEST_F(Dimse, RejectsATitleThatIsNoPreset) {
+  for (const char* title : {"FOOT", "head", "ANY-SCP"}) {
+    EXPECT_NE(store(port_, title, {files_.front()}), 0);
+    EXPECT_THAT(content_of(folder_ / "storescu"), testing::HasSubstr("Called AE Title Not Recognized"));
+  }
+  EXPECT_TRUE(client().get("/v1/jobs").at("jobs").empty());
+  EXPECT_EQ(std::filesystem::exists(daemon_->data() / "arrivals") &&
+                !std::filesystem::is_empty(daemon_->data() / "arrivals"),
+            false);
+}
+
+TEST_F(Dimse, RefusesAnInstanceThatItCannotUnderstand) {
+  DicomDataset nameless = datasets_.front();
+  nameless.erase(0x0020000D);
+  std::ofstream(folder_ / "nameless.dcm", std::ios::binary) << files_of({nameless}).front();
+  store(port_, "HEAD", {folder_ / "nameless.dcm"});
+  const std::string said = content_of(folder_ / "storescu");
+  EXPECT_THAT(said, testing::HasSubstr("Error: CannotUnderstand"));
+  EXPECT_TRUE(eventually([&] {
+    return daemon_->log().find("from STORESCU to HEAD: 0 stored, 1 refused, released") != std::string::npos;
+  })) << daemon_->log();
+}
+
+TEST_F(Dimse, WhatAPeerDoesEndsItsAssociationAlone) {
+  const RawPeer bystander(port_);
+  bystander.say(association_request());
+  const std::string request = association_request();
+  std::string noise(100'000, '\0');
+  for (std::size_t i = 0; i < noise.size(); ++i) noise[i] = static_cast<char>(i * i * 31 >> 3);
+  const std::vector<std::string> table = {
+      "",
+      noise,
+      "GET / HTTP/1.1\r\n\r\n",
+      request.substr(0, request.size() / 2),
+      std::string("\1\0\xff\xff\xff\xff", 6) + noise,  // an A-ASSOCIATE-RQ of 4 GB
+      std::string("\4\0\xff\xff\xff\xff", 6) + noise,  // data before an association
+      request + std::string("\4\0\xff\xff\xff\xff", 6) + noise,
+      request + noise,
+      request + tlv(4, 4, std::string("\xff\xff\xff\xff\1\3", 6)),  // a fragment longer than its PDU
+      request + tlv(4, 4, std::string("\0\0\0\2\7\3", 6)),          // of a context that nobody proposed
+      request + request,
+  };
+  for (const std::string& bytes : table) {
+    const RawPeer peer(port_);
+    peer.say(bytes);
+  }
+  EXPECT_EQ(store(port_, "HEAD", files_), 0) << content_of(folder_ / "storescu");
+  bystander.say(tlv(5, 4, std::string(4, '\0')));  // it asks for its release
+  const std::string heard = bystander.hear();
+  ASSERT_GT(heard.size(), 10u);
+  EXPECT_EQ(heard[0], 2);                  // A-ASSOCIATE-AC
+  EXPECT_EQ(heard[heard.size() - 10], 6);  // A-RELEASE-RP
+  EXPECT_TRUE(daemon_->running());
+}
+
+TEST_F(Dimse, AnAssociationThatIsKilledEndsAlone) {
+  const RawPeer peer(port_);
+  peer.say(association_request());
+  ASSERT_GT(child(), 0);
+  EXPECT_THAT(content_of("/proc/" + std::to_string(child()) + "/comm"),
+              testing::HasSubstr("volsmooth-dimse"));
+  EXPECT_TRUE(eventually([&] {
+    return content_of("/proc/" + std::to_string(child()) + "/status").find("Seccomp:\t2") !=
+           std::string::npos;
+  }));
+  EXPECT_EQ(kill(child(), SIGKILL), 0);
+  peer.hear();
+  EXPECT_EQ(store(port_, "HEAD", {files_.front()}), 0);
+}
+
+/// What takes all associations is told so, and others are when they end.
+TEST_F(Dimse, AssociationsAreBounded) {
+  {
+    std::list<RawPeer> idle;
+    for (int i = 0; i < 32; ++i) idle.emplace_back(port_);
+    EXPECT_EQ(RawPeer(port_).hear(), std::string("\3\0\0\0\0\4\0\2\3\2", 10));
+  }
+  EXPECT_TRUE(eventually([&] { return store(port_, "HEAD", {files_.front()}) == 0; }));
+}
+
+TEST_F(Dimse, AStopEndsAssociations) {
+  const RawPeer peer(port_);
+  peer.say(association_request());
+  ASSERT_GT(child(), 0);
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_EQ(daemon_->terminate(), 0);
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(5));
 }
 
 }  // namespace

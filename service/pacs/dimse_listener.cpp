@@ -1,0 +1,172 @@
+#include "service/pacs/dimse_listener.h"
+
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <sys/socket.h>
+
+#include <stdexcept>
+
+#include "service/pacs/ae_title.h"
+#include "service/pacs/dimse_child.h"
+
+namespace volsmooth {
+namespace {
+
+using nlohmann::json;
+using namespace std::chrono_literals;
+
+constexpr std::size_t kAssociations = 32;
+constexpr int kVerifying = 2;  ///< instances at the same time, as many as by HTTP
+constexpr auto kLook = 100ms;  ///< how often a stop is looked for
+// Beyond the limits that volsmooth-dimse keeps itself.
+constexpr auto kRequestPatience = 60s, kIdlePatience = 330s;
+
+constexpr std::uint32_t kAccepted = 0, kNoSuchTitle = 0x0107;
+/// An A-ASSOCIATE-RJ: transient, by the presentation service, local limit exceeded (DICOM PS3.8, 9.3.4).
+constexpr char kBusy[] = {3, 0, 0, 0, 0, 4, 0, 2, 3, 2};
+
+/// Without the spaces that say nothing; what is no AE title stays out of the log.
+std::string title_in(const json& request, const char* member) {
+  std::string title = request.at(member);
+  while (title.ends_with(' ')) title.pop_back();
+  title.erase(0, title.find_first_not_of(' '));
+  return is_ae_title(title) ? title : "?";
+}
+
+bool is_stored(std::uint16_t status) {
+  constexpr std::uint16_t kClass = 0xF000, kWarnings = 0xB000;
+  return status == 0 || (status & kClass) == kWarnings;
+}
+
+}  // namespace
+
+struct DimseListener::Served {
+  explicit Served(int connection) : child("receive", connection) {}
+  DimseChild child;
+  std::atomic<bool> has_ended = false;
+  std::jthread thread = {};  // joined before the child goes
+};
+
+struct DimseListener::Tally {
+  std::string called = "?", calling = "?";
+  int stored = 0, refused = 0;
+};
+
+std::map<std::string, std::string> presets_by_title(const std::vector<Preset>& presets) {
+  std::map<std::string, std::string> found;
+  for (const Preset& preset : presets) {
+    if (preset.aet.empty())
+      throw std::runtime_error("configuration, preset '" + preset.name +
+                               "': its name is too long for an AE title; give it one as 'aet'");
+    if (const auto [other, is_new] = found.emplace(preset.aet, preset.name); !is_new)
+      throw std::runtime_error("configuration: the presets '" + other->second + "' and '" + preset.name +
+                               "' have the same AE title, " + preset.aet);
+  }
+  return found;
+}
+
+DimseListener::DimseListener(Settings settings, Inbox inbox)
+    : settings_(std::move(settings)),
+      inbox_(std::move(inbox)),
+      listening_(listen_for_dimse(settings_.listen, settings_.allow_open_network)),
+      verifying_(kVerifying) {
+  if (settings_.presets.empty())
+    throw std::runtime_error("--dimse-listen needs presets in the configuration: their AE titles are called");
+  dimse_program();
+  accepting_ = std::jthread([this](const std::stop_token& stopped) { accept_all(stopped); });
+}
+
+DimseListener::~DimseListener() {
+  accepting_.request_stop();
+  if (accepting_.joinable()) accepting_.join();
+  for (const Served& served : served_) served.child.kill();
+}
+
+void DimseListener::accept_all(const std::stop_token& stopped) {
+  while (!stopped.stop_requested()) {
+    served_.remove_if([](const Served& served) { return served.has_ended.load(); });
+    pollfd polled{listening_.socket.get(), POLLIN, 0};
+    if (::poll(&polled, 1, static_cast<int>(kLook.count())) <= 0) continue;
+    FileDescriptor connection(::accept4(listening_.socket.get(), nullptr, nullptr, SOCK_CLOEXEC));
+    if (connection.get() < 0) {
+      std::this_thread::sleep_for(kLook);  // no descriptors are left, or it went away again
+      continue;
+    }
+    try {
+      begin(std::move(connection));
+    } catch (const std::exception& error) {
+      settings_.log("dimse-fault", error.what());
+    }
+  }
+}
+
+void DimseListener::begin(FileDescriptor connection) {
+  if (served_.size() >= kAssociations) {
+    ::send(connection.get(), kBusy, sizeof kBusy, MSG_NOSIGNAL | MSG_DONTWAIT);
+    return;
+  }
+  const int yes = 1;
+  ::setsockopt(connection.get(), IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
+  Served& served = served_.emplace_back(connection.get());
+  try {
+    served.thread = std::jthread([this, &served] {
+      serve(served);
+      served.has_ended = true;
+    });
+  } catch (...) {
+    served_.pop_back();
+    throw;
+  }
+}
+
+void DimseListener::serve(Served& served) {
+  Tally tally;
+  std::string end;
+  try {
+    end = talk(served, tally);
+  } catch (const std::exception&) {  // its volsmooth-dimse is gone, or says what it must not
+    end = "broken off";
+  }
+  settings_.log("dimse-association", "from " + tally.calling + " to " + tally.called + ": " +
+                                         std::to_string(tally.stored) + " stored, " +
+                                         std::to_string(tally.refused) + " refused, " + end);
+}
+
+/// How it ended.
+const char* DimseListener::talk(Served& served, Tally& tally) {
+  Channel channel = served.child.channel();
+  const json request = channel.receive_document(kRequestPatience);
+  tally.calling = title_in(request, "calling");
+  tally.called = title_in(request, "called");
+  const auto preset = settings_.presets.find(tally.called);
+  if (preset == settings_.presets.end()) {
+    channel.send({{"reject", kNoSuchTitle}});
+    channel.receive(kRequestPatience);  // until it has
+    return "rejected";
+  }
+  channel.send({{"reject", kAccepted}});
+  Arrivals arrivals(inbox_);
+  while (const auto message = channel.receive(kIdlePatience)) {
+    if (!message->is_document) {
+      arrivals.take(message->content);
+      continue;
+    }
+    const json said = document_of(*message);
+    if (said.contains("released")) return "released";
+    const std::uint16_t status = keep(arrivals, preset->second, said);
+    ++(is_stored(status) ? tally.stored : tally.refused);
+    channel.send({{"status", status}});
+  }
+  return "broken off";
+}
+
+std::uint16_t DimseListener::keep(Arrivals& arrivals, const std::string& preset, const json& announced) {
+  const std::string sop_class = announced.at("sop_class"), sop_instance = announced.at("sop_instance");
+  verifying_.acquire();
+  const auto status = arrivals.keep(preset, sop_class, sop_instance);
+  verifying_.release();
+  return status;
+}
+
+}  // namespace volsmooth

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <atomic>
+#include <list>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <semaphore>
+#include <string>
+#include <thread>
+
+#include "service/jobs/pacs.h"
+#include "service/pacs/arrivals.h"
+#include "service/pacs/listening_socket.h"
+
+namespace volsmooth {
+
+/// The presets by the AE titles that devices call them by. Throws std::runtime_error for one that has none,
+/// and for two that have the same.
+std::map<std::string, std::string> presets_by_title(const std::vector<Preset>& presets);
+
+/// Takes what devices send by C-STORE; the AE title that they call is the preset that runs on it. Each
+/// association has a volsmooth-dimse of its own, so what a peer sends can end that association alone.
+class DimseListener {
+ public:
+  struct Settings {
+    std::string listen;  ///< ADDRESS:PORT
+    bool allow_open_network = false;
+    std::map<std::string, std::string> presets;  ///< by AE title
+    std::function<void(std::string_view event, const std::string& message)> log;
+  };
+
+  /// Listens at once. Throws std::runtime_error with a sentence that says what to change.
+  DimseListener(Settings settings, Inbox inbox);
+  ~DimseListener();  ///< ends all associations
+
+  const std::string& address() const { return listening_.address; }
+
+ private:
+  struct Served;
+  struct Tally;
+
+  void accept_all(const std::stop_token& stopped);
+  void begin(FileDescriptor connection);
+  void serve(Served& served);
+  const char* talk(Served& served, Tally& tally);
+  std::uint16_t keep(Arrivals& arrivals, const std::string& preset, const nlohmann::json& announced);
+
+  const Settings settings_;
+  const Inbox inbox_;
+  ListeningSocket listening_;
+  std::counting_semaphore<> verifying_;
+  std::list<Served> served_;  // the accepting thread's, until that has ended
+  std::jthread accepting_;
+};
+
+}  // namespace volsmooth

@@ -1,0 +1,54 @@
+#include "service/pacs/presets.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "service/pacs/dimse_listener.h"
+
+namespace volsmooth {
+namespace {
+
+using nlohmann::json;
+
+std::string refusal_of(const auto& call) {
+  try {
+    call();
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Presets, AreCalledByTheirNamesInCapitalsOrByTheirTitles) {
+  const auto presets = presets_from(json{
+      {"bone-1", json::object()}, {"bone", {{"aet", "Bone Room"}}}, {"a-name-of-seventeen", json::object()}});
+  std::map<std::string, std::string> titles;
+  for (const Preset& preset : presets) titles[preset.name] = preset.aet;
+  EXPECT_EQ(titles["bone-1"], "BONE-1");
+  EXPECT_EQ(titles["bone"], "Bone Room");
+  EXPECT_EQ(titles["a-name-of-seventeen"], "");
+}
+
+TEST(Presets, ABadTitleIsRefused) {
+  for (const json& aet : {json(5), json(""), json("SEVENTEEN_LETTERS"), json("A\\B")})
+    EXPECT_THAT(refusal_of([&] {
+                  presets_from(json{{"bone", {{"aet", aet}}}});
+                }),
+                testing::HasSubstr("preset 'bone': 'aet' must be an AE title"));
+}
+
+TEST(Presets, ATitleIsOneOnly) {
+  EXPECT_EQ(presets_by_title(presets_from(json{{"bone", json::object()}})),
+            (std::map<std::string, std::string>{{"BONE", "bone"}}));
+  EXPECT_THAT(refusal_of([] {
+                presets_by_title(presets_from(json{{"bone", json::object()}, {"skin", {{"aet", "BONE"}}}}));
+              }),
+              testing::HasSubstr("'bone' and 'skin' have the same AE title, BONE"));
+  EXPECT_THAT(refusal_of([] {
+                presets_by_title(presets_from(json{{"a-name-of-seventeen", json::object()}}));
+              }),
+              testing::HasSubstr("give it one as 'aet'"));
+}
+
+}  // namespace
+}  // namespace volsmooth
