@@ -91,6 +91,7 @@ class Dimse : public testing::Test {
             {"nodes",
              {{"archive", {{"dicomweb", archive_->address()}}},
               {"cstore", dimse("ARCHIVE")},
+              {"scp", {{"dimse", {{"host", "localhost"}, {"port", scp_port_}, {"aet", "SCP"}}}}},
               {"stranger", dimse("STRANGER")}}},
             {"presets",
              {{"head",
@@ -157,7 +158,7 @@ class Dimse : public testing::Test {
   TemporaryDirectory folder_;
   std::vector<DicomDataset> datasets_ = series_of(ball_series());
   std::vector<std::string> files_;
-  const int port_ = free_port();
+  const int port_ = free_port(), scp_port_ = free_port();
   std::optional<Orthanc> archive_;
   std::optional<Daemon> daemon_;
   std::string study_, series_;
@@ -197,6 +198,35 @@ TEST_F(Dimse, WaitsForAPeerThatIsDownAndDeliversWhenItIsUp) {
   daemon_->start();
   EXPECT_EQ(delivery(id, is_delivered).at("stored"), datasets_.size() + 1);
   EXPECT_EQ(derived_series_in(*archive_, study_).size(), 1u);
+}
+
+/// The peer takes nothing but Implicit VR, when it takes anything.
+TEST_F(Dimse, AnAssociationThatBreaksOffIsTriedAgain) {
+  std::filesystem::create_directory(folder_ / "received");
+  const auto store_provider = [&](const std::string& option) {
+    return std::vector<std::string>{
+        "/usr/bin/storescp",      option, "+xi", "-od", (folder_ / "received").string(),
+        std::to_string(scp_port_)};
+  };
+  std::optional<ChildProcess> peer(std::in_place, store_provider("--abort-after"), folder_ / "scp",
+                                   folder_ / "scp");
+  const std::string id = client().submit(order("archive", "scp"));
+  ASSERT_EQ(client().wait(id).at("state"), "succeeded");
+  const json broken = delivery(id, [](const json& one) {
+    return one.at("error").is_object() &&
+           one.at("error").at("detail") == "The node 'scp' broke off the association.";
+  });
+  EXPECT_EQ(broken.at("state"), "pending");
+  EXPECT_EQ(broken.at("stored"), 0);
+  peer.emplace(store_provider("-v"), folder_ / "scp", folder_ / "scp");
+  EXPECT_EQ(delivery(id, is_delivered).at("stored"), datasets_.size() + 1);
+  std::size_t files = 0;
+  for (const auto& file : std::filesystem::directory_iterator(folder_ / "received")) {
+    ++files;
+    EXPECT_THAT(content_of(file.path()),
+                testing::HasSubstr(transfer_syntax::kImplicit + std::string("\0", 1)));
+  }
+  EXPECT_GE(files, datasets_.size() + 1);
 }
 
 TEST_F(Dimse, APeerThatRejectsUsFailsTheDeliveryAtOnce) {
