@@ -14,6 +14,7 @@
 #include <sstream>
 #include <streambuf>
 
+#include "algorithms/formats/dicom/elements.h"
 #include "algorithms/formats/dicom/refused.h"
 
 namespace volsmooth {
@@ -28,6 +29,18 @@ const char* const kImplementationVersion = "VOLSMOOTH";
 
 gdcm::Tag tag_of(std::uint32_t tag) {
   return {static_cast<std::uint16_t>(tag >> 16), static_cast<std::uint16_t>(tag & 0xffff)};
+}
+
+/// GDCM stops at elements that are out of order, and says nothing. Without what stands behind them an object
+/// could be of nobody.
+void check_all_read(const gdcm::DataSet& set, std::span<const std::byte> part10) {
+  const WalkedFile walked(part10);
+  const auto& elements = walked.elements();
+  for (std::uint32_t i = walked.dataset_begin(); i < elements.size(); i = elements[i].next) {
+    const Tag& tag = elements[i].tag;
+    if (tag.group >= kPixelData.group || set.FindDataElement(gdcm::Tag(tag.group, tag.element))) continue;
+    refuse_dicom("dicom-decode-failed", "The attributes of a DICOM file are out of order.");
+  }
 }
 
 /// Where the dictionary leaves a choice, the words that fit `is_signed`.
@@ -208,6 +221,7 @@ gdcm::DataSet public_attributes(std::span<const std::byte> part10) {
   if (!reader.ReadUpToTag(gdcm::Tag(0x7fe0, 0x0010)))
     refuse_dicom("dicom-decode-failed", "The attributes of a DICOM file cannot be read.");
   const gdcm::DataSet& set = reader.GetFile().GetDataSet();
+  check_all_read(set, part10);
   const gdcm::ByteValue* signedness =
       has(set, 0x00280103) ? set.GetDataElement(tag_of(0x00280103)).GetByteValue() : nullptr;
   const bool is_signed =

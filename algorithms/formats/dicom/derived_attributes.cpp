@@ -66,7 +66,9 @@ constexpr Required kRequired[] = {
     {"CT", 0x00180060, VR::DS, ""}, {"CT", 0x00200012, VR::IS, ""},   {"CT", 0x00185100, VR::CS, ""},
     {"MR", 0x00185100, VR::CS, ""}, {"MR", 0x00180020, VR::CS, "RM"}, {"MR", 0x00180021, VR::CS, "NONE"},
     {"MR", 0x00180022, VR::CS, ""}, {"MR", 0x00180023, VR::CS, ""},   {"MR", 0x00180081, VR::DS, ""},
-    {"MR", 0x00180091, VR::IS, ""}};
+    {"MR", 0x00180091, VR::IS, ""}, {"PT", 0x00080022, VR::DA, ""},   {"PT", 0x00080032, VR::TM, ""},
+    {"PT", 0x00181181, VR::CS, ""}, {"PT", 0x00280051, VR::CS, ""},   {"PT", 0x00540016, VR::SQ, ""},
+    {"PT", 0x00540410, VR::SQ, ""}, {"PT", 0x00540414, VR::SQ, ""}};
 
 /// Of an unpaired body part no laterality may be told.
 bool may_be_paired(const gdcm::DataSet& set) {
@@ -79,7 +81,12 @@ void complete(gdcm::DataSet& set, const std::string& modality) {
     const bool is_meant = required.modality[0] == '\0' || required.modality == modality;
     const bool is_there =
         has(set, required.tag) && (required.value[0] == '\0' || !text_of(set, required.tag).empty());
-    if (is_meant && !is_there) set_text(set, required.tag, required.vr, required.value);
+    if (!is_meant || is_there) continue;
+    if (required.vr == VR::SQ) {
+      set_sequence(set, required.tag, {});
+    } else {
+      set_text(set, required.tag, required.vr, required.value);
+    }
   }
 }
 
@@ -229,8 +236,10 @@ gdcm::DataSet derived_attributes(const gdcm::DataSet& source, const DicomSeries&
   keep_loss(set, slice, series.format);
   drop_empty_window(set);
   const bool is_enhanced = has(set, kSharedGroups);
+  const bool is_primary =
+      is_enhanced || series.modality == "PT";  // which PET is by definition (PS3.3, C.8.9.4)
   set_text(set, kImageType, VR::CS,
-           derived_type(text_of(set, kImageType), is_enhanced ? "" : "SECONDARY", series.modality));
+           derived_type(text_of(set, kImageType), is_primary ? "" : "SECONDARY", series.modality));
   if (is_enhanced) {
     derive_enhanced(set, series, derivation, slice);
   } else {
