@@ -1,0 +1,69 @@
+// fuzz_seeds FOLDER: writes the inputs that fuzzing begins with, made of phantoms: FOLDER/dicom and so on.
+#include <filesystem>
+#include <fstream>
+
+#include "tests/support/dicom_maker.h"
+#include "tests/support/nifti_maker.h"
+
+using namespace volsmooth::test;
+namespace fs = std::filesystem;
+
+namespace {
+
+void write(const fs::path& file, const std::string& bytes) {
+  fs::create_directories(file.parent_path());
+  std::ofstream(file, std::ios::binary) << bytes;
+}
+
+void write(const fs::path& file, const ByteVector& bytes) {
+  write(file, std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+}
+
+SeriesPhantom small() {
+  return {.columns = 5, .rows = 4, .slices = 3, .origin_mm = {-2, -2, -1}};
+}
+
+void write_dicom(const fs::path& folder) {
+  const auto series = series_of(small());
+  const auto enhanced = enhanced_of(small());
+  for (const auto& [name, syntax] : {std::pair{"implicit", transfer_syntax::kImplicit},
+                                     {"explicit", transfer_syntax::kExplicit},
+                                     {"big_endian", transfer_syntax::kBigEndian},
+                                     {"deflated", transfer_syntax::kDeflated}}) {
+    write(folder / (std::string("series_") + name), multipart_of(files_of(series, syntax)));
+    write(folder / (std::string("enhanced_") + name), dicom_file(enhanced, syntax));
+  }
+  write(folder / "zip", zip_of(files_of(series)));
+  auto uneven = series_of({.columns = 5, .rows = 4, .slices = 5});
+  uneven.erase(uneven.begin() + 2);
+  write(folder / "uneven", multipart_of(files_of(uneven)));
+  auto padded = series;
+  for (DicomDataset& slice : padded) {
+    slice.ss(0x00280120, -2000);
+    slice[0x7fe00010].bytes.replace(0, 4, "\x30\xf8\x30\xf8");
+  }
+  write(folder / "padded", multipart_of(files_of(padded)));
+  const auto files = files_of(series_of({.slices = 2}));  // less than 16 x 16 no encoder of JPEG 2000 takes
+  for (std::size_t which = 0; which < files.size(); ++which)  // for make_corpus.sh to compress
+    write(folder / "slices" / ("slice" + std::to_string(which)), files[which]);
+}
+
+void write_nifti(const fs::path& folder) {
+  for (const int version : {1, 2}) {
+    NiftiFile file;
+    file.version = version;
+    const ByteVector bytes = bytes_of(file);
+    write(folder / "nifti" / ("nifti" + std::to_string(version)), bytes);
+    write(folder / "nifti" / ("nifti" + std::to_string(version) + "_gzip"), gzipped(bytes));
+    write(folder / "gzip" / ("nifti" + std::to_string(version)), gzipped(bytes));
+  }
+  write(folder / "gzip" / "zeros", gzipped(ByteVector(100'000)));
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 2) return 2;
+  write_dicom(fs::path(argv[1]) / "dicom");
+  write_nifti(argv[1]);
+}
