@@ -4,6 +4,7 @@
 
 #include "tests/support/dicom_maker.h"
 #include "tests/support/nifti_maker.h"
+#include "tests/support/zip_maker.h"
 
 using namespace volsmooth::test;
 namespace fs = std::filesystem;
@@ -23,16 +24,25 @@ SeriesPhantom small() {
   return {.columns = 5, .rows = 4, .slices = 3, .origin_mm = {-2, -2, -1}};
 }
 
+std::string deflated_file(const DicomDataset& dataset) {
+  const auto packed = deflated(bytes_of_text(encoded(dataset, transfer_syntax::kDeflated)));
+  return dicom_file({}, transfer_syntax::kDeflated) +
+         std::string(reinterpret_cast<const char*>(packed.data()), packed.size());
+}
+
 void write_dicom(const fs::path& folder) {
   const auto series = series_of(small());
   const auto enhanced = enhanced_of(small());
   for (const auto& [name, syntax] : {std::pair{"implicit", transfer_syntax::kImplicit},
                                      {"explicit", transfer_syntax::kExplicit},
-                                     {"big_endian", transfer_syntax::kBigEndian},
-                                     {"deflated", transfer_syntax::kDeflated}}) {
+                                     {"big_endian", transfer_syntax::kBigEndian}}) {
     write(folder / (std::string("series_") + name), multipart_of(files_of(series, syntax)));
     write(folder / (std::string("enhanced_") + name), dicom_file(enhanced, syntax));
   }
+  std::vector<std::string> deflated_files;
+  for (const DicomDataset& slice : series) deflated_files.push_back(deflated_file(slice));
+  write(folder / "series_deflated", multipart_of(deflated_files));
+  write(folder / "enhanced_deflated", deflated_file(enhanced));
   write(folder / "zip", zip_of(files_of(series)));
   auto uneven = series_of({.columns = 5, .rows = 4, .slices = 5});
   uneven.erase(uneven.begin() + 2);
