@@ -37,7 +37,8 @@ build() {
     shift
   done
   (($#)) && shift
-  export CCACHE_NOHASHDIR=1 CCACHE_BASEDIR=$PWD  # so that every clone can use what one has compiled
+  # So that every clone can use what one has compiled, also with a precompiled header.
+  export CCACHE_NOHASHDIR=1 CCACHE_BASEDIR=$PWD CCACHE_SLOPPINESS=pch_defines,time_macros
   say "building in $directory (the first time takes minutes)"
   local log
   log=$(cmake -S . -B "$directory" -G Ninja "${options[@]}" 2>&1) ||

@@ -13,7 +13,7 @@ clang-format --dry-run -Werror "${sources[@]}" || die "run: clang-format -i on t
 
 build build -DVOLSMOOTH_TESTS=ON
 say "running the tests"
-ctest --test-dir build --output-on-failure --no-tests=error || die "tests failed; each failure is printed above"
+ctest --test-dir build --output-on-failure --no-tests=error -j "$(nproc)" || die "tests failed; each failure is printed above"
 
 build build-sanitize -DVOLSMOOTH_TESTS=ON -DVOLSMOOTH_SANITIZE=address,undefined \
   -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG=-O1 -- unit_tests
