@@ -20,6 +20,7 @@ std::vector<std::byte> deflated(std::span<const std::byte> content) {
   const auto level_buffer = std::make_unique_for_overwrite<std::uint8_t[]>(ISAL_DEF_LVL1_DEFAULT);
   isal_zstream stream;
   isal_deflate_stateless_init(&stream);
+  stream.hist_bits = 0;  // which it leaves as it was
   stream.level = 1;
   stream.level_buf = level_buffer.get();
   stream.level_buf_size = ISAL_DEF_LVL1_DEFAULT;

@@ -178,6 +178,7 @@ inline ByteVector gzipped(const ByteVector& bytes) {
   std::vector<std::uint8_t> level_buffer(ISAL_DEF_LVL3_DEFAULT);
   isal_zstream stream;
   isal_deflate_stateless_init(&stream);
+  stream.hist_bits = 0;  // which it leaves as it was
   stream.gzip_flag = IGZIP_GZIP;
   stream.level = 3;
   stream.level_buf = level_buffer.data();

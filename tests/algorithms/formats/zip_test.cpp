@@ -509,6 +509,25 @@ const Contents kSeries{{"series/1.dcm", kContent},
                        {"series/3.dcm", ByteVector(300'000)},
                        {"series/4.dcm", {}}};
 
+/// Leaves bytes behind for what is not initialised in the calls that follow.
+[[gnu::noinline]] void dirty_the_stack(std::uint16_t number) {
+  std::array<std::uint16_t, 1 << 17> remains;
+  remains.fill(number);
+  asm volatile("" : : "r"(remains.data()) : "memory");
+}
+
+TEST(ZipWriter, PacksAlikeWhateverWasInMemory) {
+  ByteVector content;
+  for (int word = 0; word < 3000; ++word)
+    for (const char digit : std::to_string(word * 7919 % 211))
+      content.push_back(static_cast<std::byte>(digit));
+  const ByteVector packed = pack(content).deflated;
+  for (const std::uint16_t number : std::array<std::uint16_t, 6>{1, 5, 8, 11, 14, 0xffff}) {
+    dirty_the_stack(number);
+    EXPECT_EQ(pack(content).deflated, packed) << number;
+  }
+}
+
 TEST(ZipWriter, WritesWhatTheReaderReads) {
   const auto contents = contents_of(written(kSeries));
   ASSERT_TRUE(contents.has_value()) << contents.error().detail;
