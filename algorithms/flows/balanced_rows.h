@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <array>
 
-#include "algorithms/flows/instruction_set.h"
 #include "algorithms/flows/mass_balance.h"
 #include "algorithms/flows/stencil_sweep.h"
 #include "algorithms/numerics/balanced.h"
+#include "algorithms/volume/instruction_set.h"
 
 namespace volsmooth {
 

@@ -3,11 +3,11 @@
 #include <span>
 
 #include "algorithms/flows/balanced_rows.h"
-#include "algorithms/flows/instruction_set.h"
 #include "algorithms/flows/mass_balance.h"
 #include "algorithms/flows/tiles.h"
 #include "algorithms/progress.h"
 #include "algorithms/volume/geometry.h"
+#include "algorithms/volume/instruction_set.h"
 
 namespace volsmooth {
 

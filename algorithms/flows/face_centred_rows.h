@@ -3,8 +3,8 @@
 #include <array>
 #include <cstdint>
 
-#include "algorithms/flows/instruction_set.h"
 #include "algorithms/numerics/metric.h"
+#include "algorithms/volume/instruction_set.h"
 
 namespace volsmooth {
 

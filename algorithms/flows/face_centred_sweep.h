@@ -2,10 +2,10 @@
 
 #include <span>
 
-#include "algorithms/flows/instruction_set.h"
 #include "algorithms/flows/tiles.h"
 #include "algorithms/progress.h"
 #include "algorithms/volume/geometry.h"
+#include "algorithms/volume/instruction_set.h"
 
 namespace volsmooth {
 

@@ -2,8 +2,8 @@
 
 #include <cstdint>
 
-#include "algorithms/flows/instruction_set.h"
 #include "algorithms/numerics/stencil.h"
+#include "algorithms/volume/instruction_set.h"
 
 namespace volsmooth {
 

@@ -4,11 +4,11 @@
 #include <span>
 
 #include "algorithms/flows/grid_metric.h"
-#include "algorithms/flows/instruction_set.h"
 #include "algorithms/flows/tiles.h"
 #include "algorithms/numerics/godunov.h"
 #include "algorithms/progress.h"
 #include "algorithms/volume/geometry.h"
+#include "algorithms/volume/instruction_set.h"
 
 namespace volsmooth {
 

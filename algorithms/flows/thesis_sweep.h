@@ -2,11 +2,11 @@
 
 #include <span>
 
-#include "algorithms/flows/instruction_set.h"
 #include "algorithms/flows/tiles.h"
 #include "algorithms/numerics/thesis_flow.h"
 #include "algorithms/progress.h"
 #include "algorithms/volume/geometry.h"
+#include "algorithms/volume/instruction_set.h"
 
 namespace volsmooth {
 

@@ -55,12 +55,16 @@ class SignedDistance {
         at_vertices_(mesh, part_of(report, 0, 0.4)),
         tree_(mesh, std::move(triangles), part_of(report, 0.4, 1)) {}
 
-  /// Positive outside. `guess` is a triangle to start from, and becomes the nearest one.
-  double operator()(const Float3& from, std::uint32_t& guess) const {
-    const NearestPoint nearest = tree_.nearest(from, guess);
-    guess = nearest.triangle;
-    return std::copysign(std::sqrt(nearest.squared_distance),
-                         dot(to_double(from) - nearest.point, normal_at(nearest)));
+  /// Of points near one another, `TriangleTree::kPoints` at the most: positive outside. `guess` is a triangle
+  /// to start from, and becomes the one nearest to the last point.
+  void operator()(std::span<const Float3> from, std::uint32_t& guess, std::span<double> distances) const {
+    std::array<NearestPoint, TriangleTree::kPoints> nearest;
+    tree_.nearest(from, guess, nearest);
+    for (std::size_t p = 0; p < from.size(); ++p) {
+      distances[p] = std::copysign(std::sqrt(nearest[p].squared_distance),
+                                   dot(to_double(from[p]) - nearest[p].point, normal_at(nearest[p])));
+    }
+    guess = nearest[from.size() - 1].triangle;
   }
 
  private:
@@ -103,6 +107,13 @@ class SignedDistance {
 struct Part {
   double area = 0, moment = 0;
   double least = std::numeric_limits<double>::infinity(), most = -std::numeric_limits<double>::infinity();
+
+  void add(double weight, double moved_by) {
+    area += weight;
+    moment += weight * moved_by;
+    least = std::min(least, moved_by);
+    most = std::max(most, moved_by);
+  }
 };
 
 }  // namespace
@@ -122,14 +133,19 @@ std::optional<Displacement> displacement(const Mesh& moved, const Mesh& original
       [&](std::int64_t begin, std::int64_t end) {
         Part& part = parts[static_cast<std::size_t>(begin / kPerChunk)];
         std::uint32_t guess = start;
+        std::array<Float3, TriangleTree::kPoints> points;
+        std::array<double, TriangleTree::kPoints> weights, moved_by;
+        std::size_t waiting = 0;
         for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k) {
           const std::uint32_t v = order[k];
-          if (areas[v] == 0) continue;
-          const double moved_by = distance(moved.positions[v], guess);
-          part.area += areas[v];
-          part.moment += areas[v] * moved_by;
-          part.least = std::min(part.least, moved_by);
-          part.most = std::max(part.most, moved_by);
+          if (areas[v] > 0) {
+            points[waiting] = moved.positions[v];
+            weights[waiting++] = areas[v];
+          }
+          if (waiting < points.size() && (k + 1 < static_cast<std::size_t>(end) || waiting == 0)) continue;
+          distance(std::span(points).first(waiting), guess, moved_by);
+          for (std::size_t p = 0; p < waiting; ++p) part.add(weights[p], moved_by[p]);
+          waiting = 0;
         }
       },
       part_of(report, 0.2, 1));

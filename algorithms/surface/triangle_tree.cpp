@@ -1,7 +1,7 @@
 #include "algorithms/surface/triangle_tree.h"
 
 #include <algorithm>
-#include <bit>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -15,6 +15,7 @@ namespace {
 
 constexpr std::size_t kLeafSize = 2;
 constexpr std::int64_t kPerChunk = 1 << 14;
+constexpr double kFlat = 1e-10;  // of a triangle: its squared area beside what it could be
 constexpr float kFar = std::numeric_limits<float>::infinity();
 
 void sort_by_place(const Mesh& mesh, std::vector<std::uint32_t>& triangles, const Progress& report) {
@@ -32,6 +33,45 @@ void sort_by_place(const Mesh& mesh, std::vector<std::uint32_t>& triangles, cons
   std::ranges::transform(morton_order(corners, part_of(report, 0.2, 1)), triangles.begin(),
                          [&](std::uint32_t k) { return unsorted[k]; });
 }
+
+void set(FourBoxes& boxes, std::size_t child, const Float3& low, const Float3& high) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    boxes.low[axis][child] = low[axis];
+    boxes.high[axis][child] = high[axis];
+  }
+}
+
+/// `points`, the last one repeated to fill the packet.
+PointPacket packet_of(std::span<const Float3> points) {
+  PointPacket packet;
+  for (std::size_t p = 0; p < PointPacket::kPoints; ++p) {
+    const Float3& point = points[std::min(p, points.size() - 1)];
+    for (std::size_t axis = 0; axis < 3; ++axis) packet.at[axis][p] = point[axis];
+    packet.reach[p] = 1e18F;
+  }
+  return packet;
+}
+
+/// For a triangle so thin that rounding decides where in it a point lies.
+NearestPoint nearest_of_sides(const Mesh& mesh, std::uint32_t triangle, const Vector3& from) {
+  const auto corners = corners_of(mesh, mesh.triangles[triangle]);
+  NearestPoint nearest{std::numeric_limits<double>::infinity(), triangle, {}, 0};
+  for (std::size_t side = 0; side < 3; ++side) {
+    const std::size_t next = (side + 1) % 3;
+    const Vector3 along = corners[next] - corners[side];
+    const double square = dot(along, along);
+    const double part = square > 0 ? std::clamp(dot(along, from - corners[side]) / square, 0.0, 1.0) : 0;
+    const Vector3 point = corners[side] + part * along, difference = from - point;
+    const double squared_distance = dot(difference, difference);
+    if (squared_distance >= nearest.squared_distance) continue;
+    const unsigned ends = (part < 1 ? 1U << side : 0) | (part > 0 ? 1U << next : 0);
+    nearest = {squared_distance, triangle, point, ends};
+  }
+  return nearest;
+}
+
+const auto compare_boxes = box_comparison(instruction_sets().back());
+const auto compare_triangle = triangle_comparison(instruction_sets().back());
 
 }  // namespace
 
@@ -57,34 +97,15 @@ NearestPoint nearest_point(const Mesh& mesh, std::uint32_t triangle, const Vecto
     return found(b + ((b2 - b1) / ((b2 - b1) + (c1 - c2))) * (c - b), 2 | 4);
   }
   const double sum = part_a + part_b + part_c;
+  if (sum <= kFlat * dot(ab, ab) * dot(ac, ac)) return nearest_of_sides(mesh, triangle, from);
   return found(a + (part_b / sum) * ab + (part_c / sum) * ac, 1 | 2 | 4);
-}
-
-std::array<float, 4> TriangleTree::Node::squared_distances(const Float3& from) const {
-  // GCC's vectors, since it makes branches of the same text for an array.
-  using Four = float __attribute__((vector_size(16)));
-  Four sum{};
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const Four below = std::bit_cast<Four>(low[axis]) - from[axis];
-    const Four above = from[axis] - std::bit_cast<Four>(high[axis]);
-    const Four larger = below > above ? below : above, beyond = larger > 0 ? larger : Four{};
-    sum += beyond * beyond;
-  }
-  return std::bit_cast<std::array<float, 4>>(sum);
-}
-
-void TriangleTree::Node::set(std::size_t child, const Float3& box_low, const Float3& box_high) {
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    low[axis][child] = box_low[axis];
-    high[axis][child] = box_high[axis];
-  }
 }
 
 TriangleTree::TriangleTree(const Mesh& mesh, std::vector<std::uint32_t> chosen, const Progress& report)
     : mesh_(mesh), triangles_(std::move(chosen)) {
   sort_by_place(mesh_, triangles_, part_of(report, 0, 0.8));
   const auto add_level = [this](std::size_t children, const auto& node, const Progress& progress) {
-    std::vector<Node> level((children + 3) / 4);
+    std::vector<FourBoxes> level((children + 3) / 4);
     parallel_for(
         std::ssize(level), kPerChunk,
         [&](std::int64_t begin, std::int64_t end) {
@@ -96,16 +117,16 @@ TriangleTree::TriangleTree(const Mesh& mesh, std::vector<std::uint32_t> chosen, 
     levels_.push_back(std::move(level));
   };
   add_level((triangles_.size() + kLeafSize - 1) / kLeafSize,
-            [this](std::size_t place) { return node_of_leaves(place); }, part_of(report, 0.8, 0.95));
+            [this](std::size_t place) { return boxes_of_leaves(place); }, part_of(report, 0.8, 0.95));
   while (levels_.back().size() > 1) {
     add_level(
-        levels_.back().size(), [this](std::size_t place) { return node_of_nodes(levels_.back(), place); },
+        levels_.back().size(), [this](std::size_t place) { return boxes_of_nodes(levels_.back(), place); },
         no_progress);
   }
 }
 
-TriangleTree::Node TriangleTree::node_of_leaves(std::size_t place) const {
-  Node node;
+FourBoxes TriangleTree::boxes_of_leaves(std::size_t place) const {
+  FourBoxes boxes;
   for (std::size_t child = 0; child < 4; ++child) {
     Float3 low{kFar, kFar, kFar}, high{-kFar, -kFar, -kFar};
     const std::size_t leaf = 4 * place + child, end = std::min(triangles_.size(), (leaf + 1) * kLeafSize);
@@ -117,58 +138,82 @@ TriangleTree::Node TriangleTree::node_of_leaves(std::size_t place) const {
         }
       }
     }
-    node.set(child, low, high);
+    set(boxes, child, low, high);
   }
-  return node;
+  return boxes;
 }
 
-TriangleTree::Node TriangleTree::node_of_nodes(std::span<const Node> below, std::size_t place) {
-  Node node;
+FourBoxes TriangleTree::boxes_of_nodes(std::span<const FourBoxes> below, std::size_t place) {
+  FourBoxes boxes;
   for (std::size_t child = 0; child < 4; ++child) {
     Float3 low{kFar, kFar, kFar}, high{-kFar, -kFar, -kFar};
     for (std::size_t axis = 0; axis < 3 && 4 * place + child < below.size(); ++axis) {
       low[axis] = std::ranges::min(below[4 * place + child].low[axis]);
       high[axis] = std::ranges::max(below[4 * place + child].high[axis]);
     }
-    node.set(child, low, high);
+    set(boxes, child, low, high);
   }
-  return node;
+  return boxes;
 }
 
-NearestPoint TriangleTree::nearest(const Float3& from, std::uint32_t guess) const {
-  // Six roundings to float make a box's distance too large by less than this.
-  constexpr double kNoMore = 1 - 0x1p-20;
+void TriangleTree::compare(std::uint32_t triangle, PointPacket& packet,
+                           std::vector<Candidate>& candidates) const {
+  const auto [a, b, c] = mesh_.triangles[triangle];
+  const std::array corners{mesh_.positions[a], mesh_.positions[b], mesh_.positions[c]};
+  Candidate candidate{triangle, 0, {}};
+  std::int32_t within_reach = 0;
+  compare_triangle({&packet, &corners, &candidate.squared_distance, &candidate.slack, &within_reach});
+  if (within_reach > 0) candidates.push_back(candidate);
+}
+
+std::vector<TriangleTree::Candidate> TriangleTree::candidates_for(PointPacket& packet,
+                                                                  std::uint32_t guess) const {
   struct Waiting {
     std::size_t level, place;  // level 0: a leaf
     float squared_distance;
   };
   std::array<Waiting, 64> stack;  // three of a level at most, of at most 16 levels, and the last four
   std::size_t waiting = 0;
-  const Vector3 exactly_from = to_double(from);
-  NearestPoint best = nearest_point(mesh_, guess, exactly_from);
+  std::vector<Candidate> candidates;
+  candidates.reserve(128);
+  compare(guess, packet, candidates);
   stack[waiting++] = {levels_.size(), 0, 0};
   while (waiting > 0) {
-    const auto [level, place, squared_distance] = stack[--waiting];
-    if (kNoMore * double{squared_distance} >= best.squared_distance) continue;
+    const auto [level, place, ignored] = stack[--waiting];
     if (level == 0) {
       const std::size_t end = std::min(triangles_.size(), (place + 1) * kLeafSize);
-      for (std::size_t t = place * kLeafSize; t < end; ++t) {
-        const NearestPoint found = nearest_point(mesh_, triangles_[t], exactly_from);
-        if (found.squared_distance < best.squared_distance) best = found;
-      }
+      for (std::size_t t = place * kLeafSize; t < end; ++t) compare(triangles_[t], packet, candidates);
       continue;
     }
-    const auto distances = levels_[level - 1][place].squared_distances(from);
+    std::array<std::int32_t, 4> within_reach;
+    std::array<float, 4> distances;
+    compare_boxes({&packet, &levels_[level - 1][place], &within_reach, &distances});
     const std::size_t first = waiting;
     for (std::size_t child = 0; child < 4; ++child) {
-      if (kNoMore * double{distances[child]} >= best.squared_distance) continue;
+      if (within_reach[child] == 0) continue;
       // The nearest child comes last, to be looked at first.
       std::size_t at = waiting++;
       for (; at > first && stack[at - 1].squared_distance < distances[child]; --at) stack[at] = stack[at - 1];
       stack[at] = {level - 1, 4 * place + child, distances[child]};
     }
   }
-  return best;
+  return candidates;
+}
+
+void TriangleTree::nearest(std::span<const Float3> from, std::uint32_t guess,
+                           std::span<NearestPoint> found) const {
+  PointPacket packet = packet_of(from);
+  const std::vector<Candidate> candidates = candidates_for(packet, guess);
+  for (std::size_t p = 0; p < from.size(); ++p) {
+    const Vector3 point = to_double(from[p]);
+    found[p].squared_distance = std::numeric_limits<double>::infinity();
+    for (const Candidate& candidate : candidates) {
+      const float limit = packet.reach[p] * (1 + kRounding) + candidate.slack;
+      if (candidate.squared_distance[p] > limit * limit) continue;
+      const NearestPoint nearest = nearest_point(mesh_, candidate.triangle, point);
+      if (nearest.squared_distance < found[p].squared_distance) found[p] = nearest;
+    }
+  }
 }
 
 }  // namespace volsmooth

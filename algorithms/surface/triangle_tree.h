@@ -7,6 +7,7 @@
 
 #include "algorithms/progress.h"
 #include "algorithms/surface/mesh.h"
+#include "algorithms/surface/point_packet.h"
 
 namespace volsmooth {
 
@@ -29,23 +30,29 @@ class TriangleTree {
   /// Of the triangles `chosen` of `mesh`, which must outlive the tree; at least one.
   TriangleTree(const Mesh& mesh, std::vector<std::uint32_t> chosen, const Progress& report = no_progress);
 
-  /// The nearest point of all triangles. `guess` is any triangle of the tree, the faster the nearer it lies.
-  NearestPoint nearest(const Float3& from, std::uint32_t guess) const;
+  /// The most points that `nearest` takes.
+  static constexpr std::size_t kPoints = PointPacket::kPoints;
+
+  /// The point of all triangles nearest to each of the points `from`; the faster the nearer these lie to one
+  /// another. `guess` is any triangle of the tree, the faster the nearer it lies.
+  void nearest(std::span<const Float3> from, std::uint32_t guess, std::span<NearestPoint> found) const;
 
  private:
-  /// The boxes of four children, axis by axis, so that the processor takes them at once. Those of children
-  /// that do not exist are infinitely far from everything.
-  struct Node {
-    std::array<std::array<float, 4>, 3> low, high;
-    std::array<float, 4> squared_distances(const Float3& from) const;
-    void set(std::size_t child, const Float3& box_low, const Float3& box_high);
+  FourBoxes boxes_of_leaves(std::size_t place) const;
+  static FourBoxes boxes_of_nodes(std::span<const FourBoxes> below, std::size_t place);
+
+  /// A triangle that was within reach of a packet, and how far it was.
+  struct Candidate {
+    std::uint32_t triangle;
+    float slack;
+    PointPacket::Lanes squared_distance;
   };
-  Node node_of_leaves(std::size_t place) const;
-  static Node node_of_nodes(std::span<const Node> below, std::size_t place);
+  void compare(std::uint32_t triangle, PointPacket& packet, std::vector<Candidate>& candidates) const;
+  std::vector<Candidate> candidates_for(PointPacket& packet, std::uint32_t guess) const;
 
   const Mesh& mesh_;
   std::vector<std::uint32_t> triangles_;
-  std::vector<std::vector<Node>> levels_;  // the lowest one over leaves, the last one is the root
+  std::vector<std::vector<FourBoxes>> levels_;  // the lowest one over leaves, the last one is the root
 };
 
 }  // namespace volsmooth

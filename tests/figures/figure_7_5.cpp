@@ -33,7 +33,8 @@ std::vector<double> distances(const Mesh& moved, const Mesh& original) {
   std::vector<double> distances;
   std::uint32_t guess = 0;
   for (const Float3& position : moved.positions) {
-    const NearestPoint nearest = tree.nearest(position, guess);
+    NearestPoint nearest;
+    tree.nearest({&position, 1}, guess, {&nearest, 1});
     guess = nearest.triangle;
     const Vector3 away = to_double(position) - nearest.point;
     distances.push_back(

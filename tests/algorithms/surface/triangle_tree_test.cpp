@@ -73,12 +73,17 @@ TEST(TriangleTree, FindsWhatASearchOfAllTrianglesFinds) {
     std::iota(all.begin(), all.end(), 0u);
     const TriangleTree tree(mesh, all);
     std::mt19937 random(count);
-    for (int k = 0; k < 200; ++k) {
-      const Float3 from = random_point(random);
-      double least = std::numeric_limits<double>::infinity();
-      for (std::uint32_t t : all)
-        least = std::min(least, nearest_point(mesh, t, to_double(from)).squared_distance);
-      EXPECT_EQ(tree.nearest(from, static_cast<std::uint32_t>(random() % count)).squared_distance, least);
+    for (std::size_t k = 0; k < 200; ++k) {
+      std::vector<Float3> from(1 + k % TriangleTree::kPoints);
+      for (Float3& point : from) point = random_point(random);
+      std::vector<NearestPoint> found(from.size());
+      tree.nearest(from, static_cast<std::uint32_t>(random() % count), found);
+      for (std::size_t p = 0; p < from.size(); ++p) {
+        double least = std::numeric_limits<double>::infinity();
+        for (std::uint32_t t : all)
+          least = std::min(least, nearest_point(mesh, t, to_double(from[p])).squared_distance);
+        EXPECT_EQ(found[p].squared_distance, least);
+      }
     }
   }
 }

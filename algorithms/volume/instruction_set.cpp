@@ -1,4 +1,4 @@
-#include "algorithms/flows/instruction_set.h"
+#include "algorithms/volume/instruction_set.h"
 
 namespace volsmooth {
 namespace {
