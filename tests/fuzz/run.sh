@@ -15,13 +15,14 @@ names=("$@")
 build build-fuzz -DVOLSMOOTH_FUZZ=ON -DVOLSMOOTH_TESTS=ON -DCMAKE_CXX_COMPILER=clang++-16 -DCMAKE_C_COMPILER=clang-16 \
   -- "${names[@]/#/fuzz_}"
 
+export ASAN_OPTIONS=detect_leaks=0
 mkdir -p build-fuzz/findings
 for name in "${names[@]}"; do
   say "fuzzing $name for $seconds s"
   mkdir -p "build-fuzz/corpus/$name"
   dictionary=()
   [[ -f tests/fuzz/$name.dict ]] && dictionary=("-dict=tests/fuzz/$name.dict")
-  "build-fuzz/bin/fuzz_$name" "${dictionary[@]}" -max_total_time="$seconds" -max_len=16384 -timeout=20 -rss_limit_mb=3000 -detect_leaks=0 \
+  "build-fuzz/bin/fuzz_$name" "${dictionary[@]}" -max_total_time="$seconds" -max_len=16384 -timeout=20 -rss_limit_mb=3000 \
     -print_final_stats=1 -artifact_prefix="build-fuzz/findings/$name-" "build-fuzz/corpus/$name" "tests/fuzz/corpus/$name" \
     2> >(grep -Ev '^#[0-9]+.(NEW|REDUCE|RELOAD)' >&2) || die "a finding: see build-fuzz/findings"
 done
