@@ -1,8 +1,9 @@
 #include "algorithms/surface/morton_order.h"
 
 #include <algorithm>
+#include <compare>
 #include <limits>
-#include <utility>
+#include <memory>
 
 #include "algorithms/surface/serial_for.h"
 #include "algorithms/volume/parallel.h"
@@ -22,9 +23,15 @@ std::uint64_t spread(std::uint64_t place) {
   return (bits | bits << 2) & 0x1249249249249249;
 }
 
-using Keyed = std::pair<std::uint64_t, std::uint32_t>;  // a place on the curve, the number of a point
+/// A point. (No std::pair, whose members an array of them would set to zero first.)
+struct Keyed {
+  std::uint64_t place;  // on the curve
+  std::uint32_t number;
+  auto operator<=>(const Keyed&) const = default;
+};
+using KeyedPoints = std::unique_ptr<Keyed[]>;
 
-std::vector<Keyed> places_on_curve(std::span<const Float3> points, const Progress& report) {
+KeyedPoints places_on_curve(std::span<const Float3> points, const Progress& report) {
   Float3 low = points.front(), high = low;
   serial_for(
       points.size(),
@@ -47,8 +54,7 @@ std::vector<Keyed> places_on_curve(std::span<const Float3> points, const Progres
     }
     return key;
   };
-  std::vector<Keyed> keyed;
-  grow(keyed, points.size(), part_of(report, 0.3, 0.5));
+  auto keyed = uninitialised<Keyed>(points.size());
   parallel_for(
       static_cast<std::int64_t>(points.size()), 1 << 16,
       [&](std::int64_t begin, std::int64_t end) {
@@ -56,7 +62,7 @@ std::vector<Keyed> places_on_curve(std::span<const Float3> points, const Progres
           keyed[p] = {key_of(points[p]), static_cast<std::uint32_t>(p)};
         }
       },
-      part_of(report, 0.5, 1));
+      part_of(report, 0.3, 1));
   return keyed;
 }
 
@@ -64,40 +70,37 @@ std::vector<Keyed> places_on_curve(std::span<const Float3> points, const Progres
 
 std::vector<std::uint32_t> morton_order(std::span<const Float3> points, const Progress& report) {
   if (points.empty()) return {};
-  const std::vector<Keyed> keyed = places_on_curve(points, part_of(report, 0, 0.2));
+  const KeyedPoints keyed = places_on_curve(points, part_of(report, 0, 0.2));
 
   // A counting sort by the first 12 of the 60 bits, then each part by itself: parallel, and soon cancelled.
   constexpr std::size_t kParts = std::size_t{1} << 12;
   const auto part_of_key = [](std::uint64_t key) { return static_cast<std::size_t>(key >> 48); };
   std::vector<std::size_t> first(kParts + 2);
-  const auto for_each_key = [&keyed](const auto& visit, const Progress& counting) {
+  const auto for_each_key = [&](const auto& visit, const Progress& counting) {
     serial_for(
-        keyed.size(),
+        points.size(),
         [&](std::size_t begin, std::size_t end) {
-          std::ranges::for_each(std::span(keyed).subspan(begin, end - begin), visit);
+          std::for_each(keyed.get() + begin, keyed.get() + end, visit);
         },
         counting);
   };
-  for_each_key([&](const Keyed& one) { ++first[part_of_key(one.first) + 2]; }, part_of(report, 0.2, 0.25));
+  for_each_key([&](const Keyed& one) { ++first[part_of_key(one.place) + 2]; }, part_of(report, 0.2, 0.25));
   for (std::size_t part = 2; part < first.size(); ++part) first[part] += first[part - 1];
-  std::vector<Keyed> sorted;
-  grow(sorted, keyed.size(), part_of(report, 0.25, 0.3));
-  for_each_key([&](const Keyed& one) { sorted[first[part_of_key(one.first) + 1]++] = one; },
-               part_of(report, 0.3, 0.4));
+  const auto sorted = uninitialised<Keyed>(points.size());
+  for_each_key([&](const Keyed& one) { sorted[first[part_of_key(one.place) + 1]++] = one; },
+               part_of(report, 0.25, 0.4));
   parallel_for(
       kParts, 16,
       [&](std::int64_t begin, std::int64_t end) {
         for (auto part = static_cast<std::size_t>(begin); part < static_cast<std::size_t>(end); ++part) {
-          const auto at = [&](std::size_t place) {
-            return sorted.begin() + static_cast<std::ptrdiff_t>(place);
-          };
-          std::sort(at(first[part]), at(first[part + 1]));
+          std::sort(sorted.get() + first[part], sorted.get() + first[part + 1]);
         }
       },
       part_of(report, 0.4, 1));
 
   std::vector<std::uint32_t> order(points.size());
-  std::ranges::transform(sorted, order.begin(), &Keyed::second);
+  std::transform(sorted.get(), sorted.get() + points.size(), order.begin(),
+                 [](const Keyed& one) { return one.number; });
   return order;
 }
 

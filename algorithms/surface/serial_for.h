@@ -4,6 +4,7 @@
 #include <cstddef>
 
 #include "algorithms/progress.h"
+#include "algorithms/volume/large_pages.h"
 
 namespace volsmooth {
 
@@ -23,6 +24,7 @@ void serial_for(std::size_t count, const Body& body, const Progress& report) {
 template <typename Vector>
 void grow(Vector& vector, std::size_t count, const Progress& report) {
   vector.reserve(count);
+  ask_for_large_pages(std::as_bytes(std::span(vector.data(), count)));
   serial_for(
       count, [&](std::size_t, std::size_t end) { vector.resize(end); }, report);
 }

@@ -6,7 +6,7 @@ namespace volsmooth {
 
 TrianglesAtVertices::TrianglesAtVertices(const Mesh& mesh, const Progress& report) {
   grow(first_, mesh.positions.size() + 2, part_of(report, 0, 0.1));
-  grow(triangles_, 3 * mesh.triangles.size(), part_of(report, 0.1, 0.2));
+  triangles_ = uninitialised<std::uint32_t>(3 * mesh.triangles.size());
   // A counting sort. The counts stand two places further on, so that after filling each start is in place.
   serial_for(
       mesh.triangles.size(),
@@ -15,7 +15,7 @@ TrianglesAtVertices::TrianglesAtVertices(const Mesh& mesh, const Progress& repor
           for (std::uint32_t vertex : mesh.triangles[t]) ++first_[std::size_t{vertex} + 2];
         }
       },
-      part_of(report, 0.2, 0.5));
+      part_of(report, 0.1, 0.5));
   for (std::size_t v = 2; v < first_.size(); ++v) first_[v] += first_[v - 1];
   serial_for(
       mesh.triangles.size(),

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -15,12 +16,12 @@ class TrianglesAtVertices {
   TrianglesAtVertices(const Mesh& mesh, const Progress& report);
 
   std::span<const std::uint32_t> at(std::size_t vertex) const {
-    return {triangles_.data() + first_[vertex], triangles_.data() + first_[vertex + 1]};
+    return {triangles_.get() + first_[vertex], triangles_.get() + first_[vertex + 1]};
   }
 
  private:
   std::vector<std::size_t> first_;
-  std::vector<std::uint32_t> triangles_;
+  std::unique_ptr<std::uint32_t[]> triangles_;
 };
 
 }  // namespace volsmooth

@@ -1,25 +1,11 @@
 #include "algorithms/volume/volume.h"
 
-#include <sys/mman.h>
-
 #include <algorithm>
-#include <cstdint>
 
+#include "algorithms/volume/large_pages.h"
 #include "algorithms/volume/parallel.h"
 
 namespace volsmooth {
-namespace {
-
-/// Of what was allocated and not touched yet. Each of the small ones would be a fault of its own.
-void ask_for_large_pages(std::span<float> voxels) {
-  constexpr std::uintptr_t kPage = 4096;
-  const auto begin = (reinterpret_cast<std::uintptr_t>(voxels.data()) + kPage - 1) / kPage * kPage;
-  const auto end = reinterpret_cast<std::uintptr_t>(voxels.data() + voxels.size());
-  if (end > begin) ::madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);
-}
-
-}  // namespace
-
 Volume::Pointer make_volume(const Size3& size, const VoxelToWorld& map) {
   const VoxelToWorld lps = in_frame(map, Frame::kLps);
   const Vector3 spacing = spacing_of(map);
@@ -35,7 +21,7 @@ Volume::Pointer make_volume(const Size3& size, const VoxelToWorld& map) {
   volume->SetOrigin(lps.origin.data());
   volume->SetDirection(direction);
   volume->Allocate();
-  ask_for_large_pages(voxels_of(*volume));
+  ask_for_large_pages(std::as_bytes(voxels_of(*volume)));
   return volume;
 }
 
