@@ -28,6 +28,8 @@ namespace volsmooth {
 // good end; without it the peer broke off.
 
 constexpr int kChannelDescriptor = 0, kConnectionDescriptor = 3;
+/// "host:port" of a peer: DCMTK has no room for more, and would cut it off.
+constexpr std::size_t kLongestAddress = 63;
 
 /// The other side is gone, silent, or says what it must not.
 class ChannelError : public std::runtime_error {

@@ -58,6 +58,8 @@ json request(const Network& network, const json& wanted, Association& associatio
   ASC_createAssociationParameters(&parameters, ASC_DEFAULTMAXPDU);
   const std::string address =
       wanted.at("host").get<std::string>() + ":" + std::to_string(wanted.at("port").get<int>());
+  static_assert(sizeof parameters->DULparams.calledPresentationAddress == kLongestAddress + 1);
+  if (address.size() > kLongestAddress) throw std::runtime_error("an address that DCMTK would cut off");
   ASC_setAPTitles(parameters, wanted.at("calling").get<std::string>().c_str(),
                   wanted.at("called").get<std::string>().c_str(), nullptr);
   ASC_setPresentationAddresses(parameters, "localhost", address.c_str());

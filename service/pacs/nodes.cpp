@@ -8,6 +8,7 @@
 #include <fstream>
 #include <stdexcept>
 
+#include "service/dimse/channel.h"
 #include "service/jobs/ids.h"
 #include "service/pacs/ae_title.h"
 
@@ -16,7 +17,6 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t kLongestHost = 253;
 constexpr int kHighestPort = 65535;
 
 [[noreturn]] void fail(const std::string& name, const std::string& what) {
@@ -67,12 +67,15 @@ DimsePeer peer_from(const std::string& name, const json& configured) {
   const auto of_host = [](char c) {
     return std::isalnum(static_cast<unsigned char>(c)) || c == '-' || c == '.';
   };
-  if (peer.host.empty() || peer.host.size() > kLongestHost || !std::ranges::all_of(peer.host, of_host))
+  if (peer.host.empty() || !std::ranges::all_of(peer.host, of_host))
     fail(name, "'host' must be a name or an IPv4 address");
   const json port = configured.value("port", json());
   if (!port.is_number_integer() || port < 1 || port > kHighestPort)
     fail(name, "'port' must be a number from 1 to 65535");
   port.get_to(peer.port);
+  if ((peer.host + ":" + std::to_string(peer.port)).size() > kLongestAddress)
+    fail(name, "'host', a colon and 'port' must be " + std::to_string(kLongestAddress) +
+                   " characters at most; give a shorter name of the host, or its address");
   if (configured.contains("calling_aet")) peer.calling = ae_title_in(configured, name, "calling_aet");
   return peer;
 }

@@ -58,6 +58,23 @@ TEST_F(Nodes, APeerIsAHostAPortAndAnAeTitle) {
   EXPECT_EQ(nodes_from(ours)[0].dimse->calling, "SMOOTHER");
 }
 
+/// DCMTK would connect to what is left of a longer one.
+TEST_F(Nodes, APeerHasAnAddressOf63CharactersAtMost) {
+  const auto with = [](std::size_t host_length, int port) {
+    return nodes_from(json{{"p", peer({{"host", std::string(host_length, 'h')}, {"port", port}})}});
+  };
+  EXPECT_EQ(with(59, 104)[0].dimse->host.size(), 59U);
+  EXPECT_EQ(with(57, 11112)[0].dimse->host.size(), 57U);
+  for (const auto& [host_length, port] : {std::pair{60, 104}, {58, 11112}, {253, 4}}) {
+    try {
+      with(static_cast<std::size_t>(host_length), port);
+      ADD_FAILURE() << host_length << " was taken";
+    } catch (const std::runtime_error& error) {
+      EXPECT_THAT(error.what(), testing::HasSubstr("node 'p': 'host', a colon and 'port' must be 63"));
+    }
+  }
+}
+
 TEST_F(Nodes, WhatIsWrongIsRefusedWithItsPlace) {
   const std::vector<std::pair<json, std::string>> table = {
       {json::array(), "'nodes' must be an object"},
