@@ -12,8 +12,7 @@ constexpr std::uint16_t kOtherThanAnnounced = 0xB007;  ///< a warning: it is sto
 }  // namespace
 
 std::uint16_t status_of(const Problem& problem) {
-  constexpr const char* kOfResources[] = {"content-too-large", "insufficient-storage", "not-ready",
-                                          "queue-full"};
+  constexpr const char* kOfResources[] = {"insufficient-storage", "not-ready", "queue-full"};
   return std::ranges::find(kOfResources, problem.slug) == std::end(kOfResources) ? kCannotUnderstand
                                                                                  : kOutOfResources;
 }
@@ -38,7 +37,7 @@ void Arrivals::write(std::string_view bytes) {
     file_ = *std::move(begun);
   }
   if (file_->bytes() + std::ssize(bytes) > inbox_.max_bytes) {
-    refused_ = kOutOfResources;
+    refused_ = kCannotUnderstand;  // another try would not make it smaller
   } else {
     file_->write(std::as_bytes(std::span(bytes)));
   }

@@ -57,7 +57,7 @@ TEST_F(ArrivalsAt, EachIsKeptForItsPreset) {
 
 TEST_F(ArrivalsAt, OneThatIsTooLargeIsRefusedAndTheNextIsNot) {
   arrivals_.take("12345");
-  EXPECT_EQ(status_of_one("678901"), 0xA700);
+  EXPECT_EQ(status_of_one("678901"), 0xC000);
   EXPECT_EQ(status_of_one("1234567890"), 0x0000);
   EXPECT_EQ(kept_, std::vector<std::string>{"head: 1234567890"});
 }
@@ -65,7 +65,7 @@ TEST_F(ArrivalsAt, OneThatIsTooLargeIsRefusedAndTheNextIsNot) {
 /// DICOM PS3.4, table B.2-1.
 TEST_F(ArrivalsAt, AProblemHasItsStatus) {
   const std::vector<std::pair<std::string, std::uint16_t>> table = {
-      {"insufficient-storage", 0xA700}, {"content-too-large", 0xA700},       {"not-ready", 0xA700},
+      {"insufficient-storage", 0xA700}, {"content-too-large", 0xC000},       {"not-ready", 0xA700},
       {"queue-full", 0xA700},           {"dicom-missing-attribute", 0xC000}, {"dicom-decode-failed", 0xC000}};
   for (const bool at_once : {false, true})
     for (const auto& [slug, status] : table) {
