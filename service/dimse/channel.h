@@ -17,15 +17,17 @@ namespace volsmooth {
 //
 // send: the daemon asks for an association, {"host", "port", "called", "calling", "sop_classes": [UID]}, and
 // gets {} or a failure. Then, for each instance, it sends its bytes, {"sop_class", "sop_instance"}, and gets
-// {"status": of the C-STORE response}, {"failure": "not-accepted"}, or a failure that ends it all. It closes
-// its side when it has no more. A failure is {"failure": "unreachable" | "lost"}, or {"failure": "rejected",
-// "result", "source", "reason"} with the numbers of PS3.8, 9.3.4.
+// {"status": of the C-STORE response}, {"failure": "not-accepted" | "unreadable"}, or a failure that ends it
+// all. It closes its side when it has no more. A failure is {"failure": "unreachable" | "lost"}, or
+// {"failure": "rejected", "result", "source", "reason"} with the numbers of PS3.8, 9.3.4.
 //
 // receive: the child, whose descriptor 3 is an accepted connection, says {"called", "calling"} and gets
 // {"reject": 0 or source << 8 | reason}. Then, for each instance that came whole, the daemon gets its bytes
-// and
-// {"sop_class", "sop_instance"}, and answers {"status": for the C-STORE response}. {"released": true} is the
-// good end; without it the peer broke off.
+// and {"sop_class", "sop_instance"}, and answers {"status": for the C-STORE response}. {"alive": true} wants
+// no answer: the peer asked for an echo. {"released": true} is the good end; without it the peer broke off.
+//
+// Both: {"failure": "internal"} is the last word of a child that cannot do its work, for no fault of the
+// peer's.
 
 constexpr int kChannelDescriptor = 0, kConnectionDescriptor = 3;
 /// "host:port" of a peer: DCMTK has no room for more, and would cut it off.

@@ -165,9 +165,11 @@ bool Receiving::serve_command() {
     return false;
   }
   if (received.bad()) return false;
-  if (command.CommandField == DIMSE_C_ECHO_RQ)
+  if (command.CommandField == DIMSE_C_ECHO_RQ) {
+    channel_.send({{"alive", true}});
     return DIMSE_sendEchoResponse(association_.get(), context, &command.msg.CEchoRQ, STATUS_Success, nullptr)
         .good();
+  }
   if (command.CommandField != DIMSE_C_STORE_RQ) return false;
   store(command.msg.CStoreRQ, context);
   return true;

@@ -27,9 +27,13 @@ void check(bool done, int error, const char* what) {
   if (!done) throw std::system_error(error, std::generic_category(), what);
 }
 
+void check(bool done, const char* what) {
+  check(done, errno, what);
+}
+
 void limit(__rlimit_resource resource, std::int64_t most) {
   const rlimit value{static_cast<rlim_t>(most), static_cast<rlim_t>(most)};
-  check(::setrlimit(resource, &value) == 0, errno, "setrlimit");
+  check(::setrlimit(resource, &value) == 0, "setrlimit");
 }
 
 /// Memory, the open descriptors, waiting for them, the time, threads' locks, and the end.
@@ -101,12 +105,12 @@ void allow_system_calls() {
 }  // namespace
 
 void enter_sandbox(std::int64_t address_space_bytes) {
-  check(::prctl(PR_SET_PDEATHSIG, SIGKILL) == 0, errno, "PR_SET_PDEATHSIG");
+  check(::prctl(PR_SET_PDEATHSIG, SIGKILL) == 0, "PR_SET_PDEATHSIG");
   limit(RLIMIT_CORE, 0);
   limit(RLIMIT_FSIZE, 0);
   if (kAddressSanitizer) return;  // it takes terabytes of addresses, and more system calls
   limit(RLIMIT_AS, address_space_bytes);
-  check(::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0, errno, "PR_SET_NO_NEW_PRIVS");
+  check(::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0, "PR_SET_NO_NEW_PRIVS");
   allow_system_calls();
 }
 

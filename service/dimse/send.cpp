@@ -59,7 +59,7 @@ json request(const Network& network, const json& wanted, Association& associatio
   const std::string address =
       wanted.at("host").get<std::string>() + ":" + std::to_string(wanted.at("port").get<int>());
   static_assert(sizeof parameters->DULparams.calledPresentationAddress == kLongestAddress + 1);
-  if (address.size() > kLongestAddress) throw std::runtime_error("an address that DCMTK would cut off");
+  if (address.size() > kLongestAddress) return {{"failure", "internal"}};
   ASC_setAPTitles(parameters, wanted.at("calling").get<std::string>().c_str(),
                   wanted.at("called").get<std::string>().c_str(), nullptr);
   ASC_setPresentationAddresses(parameters, "localhost", address.c_str());
@@ -74,15 +74,15 @@ json request(const Network& network, const json& wanted, Association& associatio
   return {{"failure", "unreachable"}};
 }
 
-/// Gives a data set read of a Part 10 file.
-void read(DcmFileFormat& file, const std::string& bytes) {
+/// Whether a Part 10 file is one.
+bool read(DcmFileFormat& file, const std::string& bytes) {
   DcmInputBufferStream stream;
   stream.setBuffer(bytes.data(), static_cast<offile_off_t>(bytes.size()));
   stream.setEos();
   file.transferInit();
   const OFCondition result = file.read(stream);
   file.transferEnd();
-  if (result.bad()) throw std::runtime_error("an instance cannot be read");
+  return result.good();
 }
 
 json store(Association& association, const json& wanted, const std::string& bytes) {
@@ -91,7 +91,7 @@ json store(Association& association, const json& wanted, const std::string& byte
   const auto context = ASC_findAcceptedPresentationContextID(association.get(), sop_class.c_str());
   if (context == 0) return {{"failure", "not-accepted"}};
   DcmFileFormat file;
-  read(file, bytes);
+  if (!read(file, bytes)) return {{"failure", "unreadable"}};
   T_DIMSE_C_StoreRQ asked{};
   asked.MessageID = association.get()->nextMsgID++;
   OFStandard::strlcpy(asked.AffectedSOPClassUID, sop_class.c_str(), sizeof asked.AffectedSOPClassUID);
@@ -109,6 +109,11 @@ json store(Association& association, const json& wanted, const std::string& byte
   return {{"failure", "lost"}};
 }
 
+/// Others are of the association, which ends with it.
+bool is_of_an_instance(const json& failure) {
+  return failure == "not-accepted" || failure == "unreadable";
+}
+
 }  // namespace
 
 void send_instances() {
@@ -121,7 +126,7 @@ void send_instances() {
   json said = request(network, channel.receive_document(kPatience), association);
   channel.send(said);
   std::string bytes;
-  while (!said.contains("failure") || said["failure"] == "not-accepted") {
+  while (!said.contains("failure") || is_of_an_instance(said["failure"])) {
     const auto message = channel.receive(kPatience);
     if (!message) {
       if (ASC_releaseAssociation(association.get()).good()) association.ended();

@@ -49,10 +49,22 @@ NodeFailure failure_from(const Node& node, const nlohmann::json& told) {
   constexpr int kPermanently = 1;
   const auto what = told.value("failure", "");
   if (what == "unreachable") return failure(node, true, "cannot be reached");
+  if (what == "internal")
+    return {{"internal",
+             "volsmooth-dimse cannot do its work; the fault is the service's.",
+             {{"node", node.name}}},
+            false};
   if (what != "rejected") return connection_lost(node);
   return failure(node, told.value("result", 0) != kPermanently,
                  std::string("rejected the association: ") +
                      reason_text(told.value("source", 0), told.value("reason", 0)));
+}
+
+NodeFailure not_started(const Node& node) {
+  return {{"not-ready",
+           "There is no room for another process or its descriptors here, so nothing was sent yet.",
+           {{"node", node.name}}},
+          true};
 }
 
 NodeFailure connection_lost(const Node& node) {

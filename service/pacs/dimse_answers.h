@@ -16,6 +16,9 @@ tl::expected<InstanceAnswer, NodeFailure> outcome_of(const Node& node, const std
 /// What a failure that volsmooth-dimse tells (dimse/channel.h) means.
 NodeFailure failure_from(const Node& node, const nlohmann::json& told);
 
+/// For want of processes, descriptors or memory, which passes.
+NodeFailure not_started(const Node& node);
+
 /// For a peer that is gone, or whose bytes brought volsmooth-dimse down.
 NodeFailure connection_lost(const Node& node);
 

@@ -24,7 +24,8 @@ void check(bool done, int error, const char* what) {
 /// Both are closed on exec; the child gets copies.
 std::array<FileDescriptor, 2> socket_pair() {
   int ends[2];
-  check(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) == 0, errno, "a socket pair");
+  const int failed = ::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends);
+  check(failed == 0, errno, "a socket pair");
   return {FileDescriptor(ends[0]), FileDescriptor(ends[1])};
 }
 

@@ -137,6 +137,7 @@ void DimseListener::serve(Served& served) {
 const char* DimseListener::talk(Served& served, Tally& tally) {
   Channel channel = served.child.channel();
   const json request = channel.receive_document(kRequestPatience);
+  if (request.contains("failure")) return "broken off by a fault of the service's";
   tally.calling = title_in(request, "calling");
   tally.called = title_in(request, "called");
   const auto preset = settings_.presets.find(tally.called);
@@ -154,6 +155,7 @@ const char* DimseListener::talk(Served& served, Tally& tally) {
     }
     const json said = document_of(*message);
     if (said.contains("released")) return "released";
+    if (said.contains("alive")) continue;
     const std::uint16_t status = keep(arrivals, preset->second, said);
     ++(is_stored(status) ? tally.stored : tally.refused);
     channel.send({{"status", status}});

@@ -1,6 +1,9 @@
 #include "service/pacs/dimse_sending.h"
 
+#include <cerrno>
+#include <optional>
 #include <set>
+#include <system_error>
 
 #include "service/pacs/dimse_answers.h"
 #include "service/pacs/dimse_child.h"
@@ -28,8 +31,8 @@ json association_for(const DimsePeer& peer, std::span<const DicomInstance> insta
 /// One association, from the request on.
 class Storing {
  public:
-  Storing(const Node& node, std::span<const DicomInstance> instances)
-      : node_(node), child_("send"), channel_(child_.channel()) {
+  Storing(const Node& node, std::span<const DicomInstance> instances, DimseChild& child)
+      : node_(node), child_(child), channel_(child_.channel()) {
     channel_.send(association_for(*node.dimse, instances));
   }
 
@@ -48,6 +51,8 @@ class Storing {
     constexpr std::uint16_t kClassNotSupported = 0x0122;
     if (told.value("failure", "") == "not-accepted")
       return outcome_of(node_, instance.sop_instance_uid, kClassNotSupported);
+    if (told.value("failure", "") == "unreadable")
+      return InstanceAnswer{instance.sop_instance_uid, false, "it cannot be read any more"};
     if (told.contains("failure")) return tl::unexpected(failure_from(node_, told));
     return outcome_of(node_, instance.sop_instance_uid, told.at("status").get<std::uint16_t>());
   }
@@ -56,9 +61,21 @@ class Storing {
 
  private:
   const Node& node_;
-  DimseChild child_;
+  DimseChild& child_;
   Channel channel_;
 };
+
+/// False: there is no room for it just now.
+bool start(std::optional<DimseChild>& child) {
+  try {
+    child.emplace("send");
+    return true;
+  } catch (const std::system_error& error) {
+    for (const int passing : {EAGAIN, ENOMEM, EMFILE, ENFILE})
+      if (error.code() == std::error_code(passing, std::generic_category())) return false;
+    throw;
+  }
+}
 
 }  // namespace
 
@@ -67,8 +84,10 @@ tl::expected<void, NodeFailure> store_instances(
     const std::function<void(std::span<const InstanceAnswer>)>& on_answers) {
   std::set<std::string> wanted;
   for (const DicomInstance& instance : instances) wanted.insert(instance.sop_instance_uid);
+  std::optional<DimseChild> child;
+  if (!start(child)) return tl::unexpected(not_started(node));
   try {
-    Storing storing(node, instances);
+    Storing storing(node, instances, *child);
     if (auto opened = storing.opened(); !opened) return opened;
     std::optional<NodeFailure> failure;
     for_each_instance(file, [&](const DicomInstance& instance, std::span<const std::byte> bytes) {

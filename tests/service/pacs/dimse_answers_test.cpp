@@ -68,6 +68,12 @@ TEST(DimseAnswers, OnlyAPermanentRejectionIsFinal) {
   }
 }
 
+TEST(DimseAnswers, OurOwnFaultIsNotTheNodes) {
+  const NodeFailure failure = failure_from(kNode, {{"failure", "internal"}});
+  EXPECT_FALSE(failure.is_passing);
+  EXPECT_EQ(failure.problem.slug, "internal");
+}
+
 TEST(DimseAnswers, WhoIsGoneIsAskedAgain) {
   for (const json& told :
        {json{{"failure", "unreachable"}}, json{{"failure", "lost"}}, json{{"failure", "x"}}}) {

@@ -1,0 +1,48 @@
+#include "service/pacs/dimse_sending.h"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+namespace volsmooth {
+namespace {
+
+const Node kNode{.name = "archive", .dimse = DimsePeer{"127.0.0.1", 1, "PACS", "VOLSMOOTH"}};
+
+/// While it lives, `spare` more descriptors can be opened.
+class FewDescriptors {
+ public:
+  explicit FewDescriptors(int spare) {
+    ::getrlimit(RLIMIT_NOFILE, &before_);
+    const int lowest = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
+    ::close(lowest);
+    const rlimit few{static_cast<rlim_t>(lowest + spare), before_.rlim_max};
+    ::setrlimit(RLIMIT_NOFILE, &few);
+  }
+  FewDescriptors(const FewDescriptors&) = delete;
+  ~FewDescriptors() { ::setrlimit(RLIMIT_NOFILE, &before_); }
+
+ private:
+  rlimit before_{};
+};
+
+TEST(DimseSending, WantOfDescriptorsPasses) {
+  for (const int spare : {0, 1}) {
+    const FewDescriptors few(spare);
+    const auto sent = store_instances(kNode, "/nowhere", {}, [](auto) {});
+    ASSERT_FALSE(sent);
+    EXPECT_TRUE(sent.error().is_passing);
+    EXPECT_EQ(sent.error().problem.slug, "not-ready");
+  }
+}
+
+TEST(DimseSending, APeerThatIsNotThereIsUnreachable) {
+  const auto sent = store_instances(kNode, "/nowhere", {}, [](auto) {});
+  ASSERT_FALSE(sent);
+  EXPECT_TRUE(sent.error().is_passing);
+  EXPECT_EQ(sent.error().problem.slug, "node-unreachable");
+}
+
+}  // namespace
+}  // namespace volsmooth
