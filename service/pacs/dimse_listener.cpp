@@ -86,6 +86,7 @@ DimseListener::~DimseListener() {
 void DimseListener::accept_all(const std::stop_token& stopped) {
   while (!stopped.stop_requested()) {
     served_.remove_if([](const Served& served) { return served.has_ended.load(); });
+    turned_away_.look();
     pollfd polled{listening_.socket.get(), POLLIN, 0};
     if (::poll(&polled, 1, static_cast<int>(kLook.count())) <= 0) continue;
     FileDescriptor connection(::accept4(listening_.socket.get(), nullptr, nullptr, SOCK_CLOEXEC));
@@ -103,7 +104,7 @@ void DimseListener::accept_all(const std::stop_token& stopped) {
 
 void DimseListener::begin(FileDescriptor connection) {
   if (served_.size() >= kAssociations) {
-    ::send(connection.get(), kBusy, sizeof kBusy, MSG_NOSIGNAL | MSG_DONTWAIT);
+    turned_away_.add(std::move(connection), {kBusy, sizeof kBusy});
     return;
   }
   const int yes = 1;

@@ -11,6 +11,7 @@
 #include "service/jobs/pacs.h"
 #include "service/pacs/arrivals.h"
 #include "service/pacs/listening_socket.h"
+#include "service/pacs/turned_away.h"
 
 namespace volsmooth {
 
@@ -50,6 +51,7 @@ class DimseListener {
   ListeningSocket listening_;
   std::counting_semaphore<> verifying_;
   std::list<Served> served_;  // the accepting thread's, until that has ended
+  TurnedAway turned_away_;    // its as well
   std::jthread accepting_;
 };
 

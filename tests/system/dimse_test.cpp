@@ -337,7 +337,9 @@ TEST_F(Dimse, AssociationsAreBounded) {
   {
     std::list<RawPeer> idle;
     for (int i = 0; i < 32; ++i) idle.emplace_back(port_);
-    EXPECT_EQ(RawPeer(port_).hear(), std::string("\3\0\0\0\0\4\0\2\3\2", 10));
+    const RawPeer one_too_many(port_);
+    one_too_many.say(association_request());
+    EXPECT_EQ(one_too_many.hear(), std::string("\3\0\0\0\0\4\0\2\3\2", 10));
   }
   EXPECT_TRUE(eventually([&] { return store(port_, "HEAD", {files_.front()}) == 0; }));
 }

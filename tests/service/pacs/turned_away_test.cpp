@@ -1,0 +1,75 @@
+#include "service/pacs/turned_away.h"
+
+#include <arpa/inet.h>
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+
+#include <cerrno>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+namespace volsmooth {
+namespace {
+
+/// Both ends of a TCP connection: ours, and the peer's.
+std::pair<FileDescriptor, FileDescriptor> connection() {
+  const FileDescriptor listening(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  FileDescriptor peer(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t length = sizeof address;
+  auto* const any = reinterpret_cast<sockaddr*>(&address);
+  if (::bind(listening.get(), any, length) != 0 || ::listen(listening.get(), 1) != 0 ||
+      ::getsockname(listening.get(), any, &length) != 0 || ::connect(peer.get(), any, length) != 0)
+    throw std::runtime_error("no connection");
+  return {FileDescriptor(::accept(listening.get(), nullptr, nullptr)), std::move(peer)};
+}
+
+/// What comes, and how it ends.
+std::string heard_by(const FileDescriptor& peer) {
+  std::string heard;
+  char buffer[100];
+  ssize_t got = 0;
+  while ((got = ::recv(peer.get(), buffer, sizeof buffer, 0)) > 0)
+    heard.append(buffer, static_cast<std::size_t>(got));
+  return heard + (got == 0 ? ", the end" : errno == ECONNRESET ? ", a reset" : ", an error");
+}
+
+bool say(const FileDescriptor& peer, const std::string& text) {
+  return ::send(peer.get(), text.data(), text.size(), MSG_NOSIGNAL) == std::ssize(text);
+}
+
+TEST(TurnedAway, ThePeerHearsItWhateverItSaid) {
+  TurnedAway away;
+  auto [ours, peer] = connection();
+  EXPECT_TRUE(say(peer, std::string(10'000, 'x')));  // before
+  away.add(std::move(ours), "no");
+  EXPECT_TRUE(say(peer, "y"));  // and after
+  away.look();
+  EXPECT_FALSE(away.empty());
+  EXPECT_EQ(heard_by(peer), "no, the end");
+  peer = FileDescriptor();
+  away.look();
+  EXPECT_TRUE(away.empty());
+}
+
+TEST(TurnedAway, TheOldestGoesForTheMostRecent) {
+  TurnedAway away;
+  auto [ours, peer] = connection();
+  away.add(std::move(ours), "no");
+  EXPECT_EQ(heard_by(peer), "no, the end");
+  std::list<FileDescriptor> others;
+  for (std::size_t i = 1; i <= TurnedAway::kMost; ++i) {
+    EXPECT_TRUE(say(peer, "x")) << i;  // it is still there
+    auto [our_other, other] = connection();
+    away.add(std::move(our_other), "no");
+    others.push_back(std::move(other));
+  }
+  say(peer, "x");  // a connection that is gone resets this one
+  EXPECT_FALSE(say(peer, "x"));
+}
+
+}  // namespace
+}  // namespace volsmooth
