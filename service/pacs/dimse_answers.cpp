@@ -1,6 +1,6 @@
 #include "service/pacs/dimse_answers.h"
 
-#include <cstdio>
+#include "service/pacs/hexadecimal.h"
 
 namespace volsmooth {
 namespace {
@@ -10,19 +10,6 @@ NodeFailure failure(const Node& node, bool is_passing, const std::string& what) 
            "The node '" + node.name + "' " + what + ".",
            {{"node", node.name}}},
           is_passing};
-}
-
-std::string hexadecimal(std::uint16_t status) {
-  char text[8];
-  std::snprintf(text, sizeof text, "0x%04X", static_cast<unsigned>(status));
-  return text;
-}
-
-bool is_warning(std::uint16_t status) {
-  constexpr std::uint16_t kClass = 0xF000, kWarnings = 0xB000;
-  constexpr std::uint16_t kWarning = 0x0001, kAttributeList = 0x0107, kValueRange = 0x0116;
-  return (status & kClass) == kWarnings || status == kWarning || status == kAttributeList ||
-         status == kValueRange;
 }
 
 /// DICOM PS3.8, table 9-21.
@@ -36,13 +23,19 @@ const char* reason_text(int source, int reason) {
 
 }  // namespace
 
+bool is_stored(std::uint16_t status) {
+  constexpr std::uint16_t kClass = 0xF000, kWarnings = 0xB000;
+  constexpr std::uint16_t kSuccess = 0, kWarning = 0x0001, kAttributeList = 0x0107, kValueRange = 0x0116;
+  return status == kSuccess || (status & kClass) == kWarnings || status == kWarning ||
+         status == kAttributeList || status == kValueRange;
+}
+
 tl::expected<InstanceAnswer, NodeFailure> outcome_of(const Node& node, const std::string& sop_instance_uid,
                                                      std::uint16_t status) {
-  constexpr std::uint16_t kSuccess = 0, kClass = 0xFF00, kOutOfResources = 0xA700;
+  constexpr std::uint16_t kClass = 0xFF00, kOutOfResources = 0xA700;
   if ((status & kClass) == kOutOfResources)
     return tl::unexpected(failure(node, true, "is out of resources (status " + hexadecimal(status) + ")"));
-  if (status == kSuccess) return InstanceAnswer{sop_instance_uid, true, {}};
-  return InstanceAnswer{sop_instance_uid, is_warning(status), hexadecimal(status)};
+  return InstanceAnswer{sop_instance_uid, is_stored(status), status == 0 ? "" : hexadecimal(status)};
 }
 
 NodeFailure failure_from(const Node& node, const nlohmann::json& told) {

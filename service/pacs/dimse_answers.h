@@ -8,6 +8,9 @@
 
 namespace volsmooth {
 
+/// Whether a C-STORE response says success or a warning.
+bool is_stored(std::uint16_t status);
+
 /// What the status of a C-STORE response (DICOM PS3.4, B.2.3, and PS3.7, annex C) says of an instance. A peer
 /// that is out of resources is a passing failure: nothing is said of the instance yet.
 tl::expected<InstanceAnswer, NodeFailure> outcome_of(const Node& node, const std::string& sop_instance_uid,

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "service/pacs/ae_title.h"
+#include "service/pacs/dimse_answers.h"
 #include "service/pacs/dimse_child.h"
 
 namespace volsmooth {
@@ -32,11 +33,6 @@ std::string title_in(const json& request, const char* member) {
   while (title.ends_with(' ')) title.pop_back();
   title.erase(0, title.find_first_not_of(' '));
   return is_ae_title(title) ? title : "?";
-}
-
-bool is_stored(std::uint16_t status) {
-  constexpr std::uint16_t kClass = 0xF000, kWarnings = 0xB000;
-  return status == 0 || (status & kClass) == kWarnings;
 }
 
 }  // namespace

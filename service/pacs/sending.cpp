@@ -1,10 +1,10 @@
 #include "service/pacs/sending.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <map>
 #include <set>
 
+#include "service/pacs/hexadecimal.h"
 #include "service/pacs/instances.h"
 
 namespace volsmooth {
@@ -37,11 +37,9 @@ const json& items_of(const json& document, const char* tag) {
   return values == element->end() || !values->is_array() ? none : *values;
 }
 
-std::string hexadecimal(const json& reason) {
+std::string text_of_reason(const json& reason) {
   if (!reason.is_number_integer()) return "no reason given";
-  char text[16];
-  std::snprintf(text, sizeof text, "0x%04X", reason.get<unsigned>() & 0xFFFFU);
-  return text;
+  return hexadecimal(static_cast<std::uint16_t>(reason.get<unsigned>() & 0xFFFFU));
 }
 
 /// The instances of a request and their body.
@@ -86,7 +84,7 @@ std::vector<InstanceAnswer> answers_from(const NodeAnswer& answer, std::span<con
       if (const json uid = first_value(item, kInstanceUid); uid.is_string()) stored.insert(uid);
     for (const json& item : items_of(document, kFailed))
       if (const json uid = first_value(item, kInstanceUid); uid.is_string())
-        refused[uid] = hexadecimal(first_value(item, kFailureReason));
+        refused[uid] = text_of_reason(first_value(item, kFailureReason));
   }
   std::vector<InstanceAnswer> answers;
   for (const std::string& uid : sent_uids) {
