@@ -95,7 +95,7 @@ class Dimse : public testing::Test {
               {"stranger", dimse("STRANGER")}}},
             {"presets",
              {{"head",
-               {{"job", {{"isovalues", json::array()}}}, {"destination", "cstore"}, {"quiet_seconds", 2}}}}}};
+               {{"job", {{"isovalues", json::array()}}}, {"destination", "cstore"}, {"quiet_seconds", 5}}}}}};
   }
 
   /// What storescu ends with.
@@ -139,6 +139,21 @@ class Dimse : public testing::Test {
     if (const json job = client().wait(id); job.at("state") != "succeeded")
       throw std::runtime_error("the job ended as " + job.dump());
     return delivery(id, is_delivered);
+  }
+
+  /// Open descriptors of the daemon.
+  std::ptrdiff_t descriptors() const {
+    return std::ranges::distance(
+        std::filesystem::directory_iterator("/proc/" + std::to_string(daemon_->pid()) + "/fd"));
+  }
+
+  bool has_children() const {
+    const auto tasks =
+        std::filesystem::directory_iterator("/proc/" + std::to_string(daemon_->pid()) + "/task");
+    return std::ranges::any_of(tasks, [](const std::filesystem::directory_entry& task) {
+      pid_t found = -1;
+      return static_cast<bool>(std::ifstream(task.path() / "children") >> found);
+    });
   }
 
   /// The volsmooth-dimse that serves the only association.
@@ -286,6 +301,7 @@ TEST_F(Dimse, RefusesAnInstanceThatItCannotUnderstand) {
 }
 
 TEST_F(Dimse, WhatAPeerDoesEndsItsAssociationAlone) {
+  const auto descriptors_before = descriptors();
   const RawPeer bystander(port_);
   bystander.say(association_request());
   const std::string request = association_request();
@@ -314,6 +330,8 @@ TEST_F(Dimse, WhatAPeerDoesEndsItsAssociationAlone) {
   ASSERT_GT(heard.size(), 10u);
   EXPECT_EQ(heard[0], 2);                  // A-ASSOCIATE-AC
   EXPECT_EQ(heard[heard.size() - 10], 6);  // A-RELEASE-RP
+  EXPECT_TRUE(eventually([&] { return !has_children() && descriptors() == descriptors_before; }))
+      << descriptors() << " descriptors, " << descriptors_before << " before";
   EXPECT_TRUE(daemon_->running());
 }
 
