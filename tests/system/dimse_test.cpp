@@ -7,6 +7,7 @@
 #include <list>
 #include <optional>
 
+#include "tests/support/raw_association.h"
 #include "tests/system/orthanc.h"
 
 namespace volsmooth::test {
@@ -43,24 +44,6 @@ class RawPeer {
  private:
   const int socket_ = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
 };
-
-/// An item or a PDU: a type, a byte of nothing, and the length of what follows, the highest byte first.
-std::string tlv(char type, int length_bytes, const std::string& content) {
-  std::string text{type, '\0'};
-  for (int i = length_bytes; i-- > 0;) text += static_cast<char>(content.size() >> (8 * i) & 0xFF);
-  return text + content;
-}
-
-/// An A-ASSOCIATE-RQ for HEAD that proposes Verification (DICOM PS3.8, 9.3.2).
-std::string association_request() {
-  const auto title = [](std::string text) { return text.append(16 - text.size(), ' '); };
-  const std::string context =
-      std::string("\1\0\0\0", 4) + tlv(0x30, 2, "1.2.840.10008.1.1") + tlv(0x40, 2, "1.2.840.10008.1.2");
-  const std::string maximum = tlv(0x51, 2, std::string("\0\0\x40\0", 4)) + tlv(0x52, 2, "1.2.3.4");
-  return tlv(1, 4,
-             std::string("\0\1\0\0", 4) + title("HEAD") + title("RAW") + std::string(32, '\0') +
-                 tlv(0x10, 2, "1.2.840.10008.3.1.1.1") + tlv(0x20, 2, context) + tlv(0x50, 2, maximum));
-}
 
 /// An archive and a daemon that knows it: by DICOMweb as "archive", by DIMSE as "cstore", by a wrong AE title
 /// as "stranger".
@@ -325,7 +308,7 @@ TEST_F(Dimse, WhatAPeerDoesEndsItsAssociationAlone) {
     peer.say(bytes);
   }
   EXPECT_EQ(store(port_, "HEAD", files_), 0) << content_of(folder_ / "storescu");
-  bystander.say(tlv(5, 4, std::string(4, '\0')));  // it asks for its release
+  bystander.say(release_request());
   const std::string heard = bystander.hear();
   ASSERT_GT(heard.size(), 10u);
   EXPECT_EQ(heard[0], 2);                  // A-ASSOCIATE-AC
@@ -333,6 +316,18 @@ TEST_F(Dimse, WhatAPeerDoesEndsItsAssociationAlone) {
   EXPECT_TRUE(eventually([&] { return !has_children() && descriptors() == descriptors_before; }))
       << descriptors() << " descriptors, " << descriptors_before << " before";
   EXPECT_TRUE(daemon_->running());
+}
+
+/// What some peers keep an association open with.
+TEST_F(Dimse, EchoesAreAnsweredUntilTheRelease) {
+  const RawPeer peer(port_);
+  peer.say(association_request() + echo_request() + echo_request() + release_request());
+  const std::string heard = peer.hear();
+  ASSERT_GT(heard.size(), 10u);
+  EXPECT_EQ(heard[heard.size() - 10], 6);  // A-RELEASE-RP
+  EXPECT_TRUE(eventually([&] {
+    return daemon_->log().find("from RAW to HEAD: 0 stored, 0 refused, released") != std::string::npos;
+  })) << daemon_->log();
 }
 
 TEST_F(Dimse, AnAssociationThatIsKilledEndsAlone) {

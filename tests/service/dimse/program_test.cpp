@@ -11,7 +11,7 @@
 
 #include "service/dimse/part10.h"
 #include "service/pacs/dimse_child.h"
-#include "tests/service/dimse/raw_association.h"
+#include "tests/support/raw_association.h"
 
 namespace volsmooth {
 namespace {
