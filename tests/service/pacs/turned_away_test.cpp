@@ -27,8 +27,10 @@ std::pair<FileDescriptor, FileDescriptor> connection() {
   return {FileDescriptor(::accept(listening.get(), nullptr, nullptr)), std::move(peer)};
 }
 
-/// What comes, and how it ends.
+/// What comes, and how it ends, within 10 s.
 std::string heard_by(const FileDescriptor& peer) {
+  const timeval patience{10, 0};
+  ::setsockopt(peer.get(), SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
   std::string heard;
   char buffer[100];
   ssize_t got = 0;
