@@ -26,6 +26,7 @@ bool ClaimedJob::succeed(std::vector<Result> results) {
 }
 
 void ClaimedJob::fail(Problem problem) {
+  if (is_interrupted()) return end_interrupted();
   settle_as(JobState::kFailed, running_->progress(), std::move(problem), {});
 }
 
@@ -45,6 +46,7 @@ bool ClaimedJob::continue_with(Retrieved retrieved) {
 }
 
 void ClaimedJob::wait_until(Time not_before, Problem why) {
+  if (is_interrupted()) return end_interrupted();
   JobChange change{
       job_.id, job_.attempt, JobState::kRunning, JobState::kQueued, {"waiting-for-source", 0, std::nullopt}};
   change.progress_events = running_->events_after({});

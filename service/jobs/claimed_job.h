@@ -26,16 +26,19 @@ class ClaimedJob {
 
   bool succeed(
       std::vector<Result> results);  ///< false: the results must not be seen, the caller removes them
+  /// Of one that is interrupted, the problem may come of that: it ends as such.
   void fail(Problem problem);
   /// Queued again, now to compute on what was retrieved; false: it is not wanted any more.
   bool continue_with(Retrieved retrieved);
-  void wait_until(Time not_before, Problem why);  ///< queued again, to ask its source then
-  void end_interrupted();                         ///< cancelled if somebody asked for that, else queued again
+  void wait_until(Time not_before,
+                  Problem why);  ///< queued again, to ask its source then, unless interrupted
+  void end_interrupted();        ///< cancelled if somebody asked for that, else queued again
 
  private:
   bool settle_as(JobState to, JobProgress progress, std::optional<Problem> error,
                  std::vector<Result> results);
   bool settle(JobChange change);
+  bool is_interrupted() const { return running_->interruption() != RunningJob::Interruption::kNone; }
 
   const Job job_;
   RunningJobs& running_jobs_;

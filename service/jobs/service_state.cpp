@@ -191,7 +191,9 @@ tl::expected<VolumeFacts, Problem> JobService::State::verify(const std::filesyst
   };
   try {
     unless_stopping(0);
-    return engine.inspect(file, options, unless_stopping);
+    auto facts = engine.inspect(file, options, unless_stopping);
+    if (!facts) unless_stopping(1);  // what stops the service may have brought down the reader as well
+    return facts;
   } catch (const Cancelled&) {
     return refuse("not-ready", "The service is stopping; upload the volume again when it is back.");
   }

@@ -59,5 +59,23 @@ TEST_F(ClaimedJobTest, ThatIsInterruptedIsQueuedAgainUnlessItWasCancelled) {
   EXPECT_EQ(changes_[1].to, JobState::kCancelled);
 }
 
+/// What stops the daemon can bring down what the job needs before the job hears of the stop.
+TEST_F(ClaimedJobTest, ThatFailsWhileItIsInterruptedIsNotFailed) {
+  for (const auto why : {RunningJob::Interruption::kStop, RunningJob::Interruption::kCancel}) {
+    ClaimedJob failing = claim(), waiting = claim();
+    for (ClaimedJob* job : {&failing, &waiting}) job->running().interrupt(why);
+    failing.fail({"dicom-decode-failed", "Its reader is gone."});
+    waiting.wait_until({}, {"node-unreachable", "It is down."});
+  }
+  std::vector<JobState> ends;
+  for (const JobChange& change : changes_) {
+    ends.push_back(change.to);
+    EXPECT_FALSE(change.error);
+    EXPECT_FALSE(change.not_before);
+  }
+  using enum JobState;
+  EXPECT_EQ(ends, (std::vector{kQueued, kQueued, kCancelled, kCancelled}));
+}
+
 }  // namespace
 }  // namespace volsmooth

@@ -56,6 +56,12 @@ TEST(IngestChild, DeathIsAProblemOfTheUpload) {
   }
 }
 
+/// Ctrl-C and a stop by systemd go to the children as well, whose work the daemon still needs to end in
+/// order.
+TEST(IngestChild, WhatEndsTheDaemonDoesNotEndIt) {
+  EXPECT_TRUE(run_script("kill -INT $$; kill -TERM $$; kill -HUP $$; echo '{}'"));
+}
+
 TEST(IngestChild, WithoutASandboxItIsOurFault) {
   EXPECT_THROW((void)run_script("exit 70"), std::runtime_error);
 }
