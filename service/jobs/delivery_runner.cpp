@@ -59,17 +59,21 @@ tl::expected<void, NodeFailure> DeliveryRunner::send(const DeliveryStore::Due& d
   }
   deliveries_.expect(due.job_id, all);
 
+  const auto keep_going = [this] {
+    if (stopping_) throw Cancelled();
+  };
   const auto record = [&](std::span<const InstanceAnswer> answers) {
     deliveries_.record(due.job_id, answers);
     wake_(due.job_id);
-    if (stopping_) throw Cancelled();
+    keep_going();
   };
   const std::vector<DicomInstance> pending = deliveries_.pending(due.job_id);
   for (auto first = pending.begin(); first != pending.end();) {
     const auto last = std::find_if(first, pending.end(),
                                    [&](const DicomInstance& other) { return other.result != first->result; });
-    if (auto sent = pacs_.send(due.destination, place / first->result, std::span(first, last), record); !sent)
-      return sent;
+    auto sent =
+        pacs_.send(due.destination, place / first->result, std::span(first, last), record, keep_going);
+    if (!sent) return sent;
     first = last;
   }
   return {};

@@ -62,10 +62,12 @@ struct Pacs {
   std::function<std::vector<DicomInstance>(const std::filesystem::path& file)> instances_in;
 
   /// Sends those instances of a result file to a node. `on_answers` gets what the node says of each, as it
-  /// says it; what it throws ends the sending.
+  /// says it, and `keep_going` is called several times a second or so, from any thread; what they throw ends
+  /// the sending.
   std::function<tl::expected<void, NodeFailure>(
       const std::string& node, const std::filesystem::path& file, std::span<const DicomInstance> instances,
-      const std::function<void(std::span<const InstanceAnswer>)>& on_answers)>
+      const std::function<void(std::span<const InstanceAnswer>)>& on_answers,
+      const std::function<void()>& keep_going)>
       send;
 };
 

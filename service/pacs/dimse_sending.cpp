@@ -1,9 +1,13 @@
 #include "service/pacs/dimse_sending.h"
 
 #include <cerrno>
+#include <condition_variable>
+#include <exception>
+#include <mutex>
 #include <optional>
 #include <set>
 #include <system_error>
+#include <thread>
 
 #include "service/pacs/dimse_answers.h"
 #include "service/pacs/dimse_child.h"
@@ -27,6 +31,41 @@ json association_for(const DimsePeer& peer, std::span<const DicomInstance> insta
           {"calling", peer.calling},
           {"sop_classes", sop_classes}};
 }
+
+/// Asks ten times a second whether to go on, and kills the child when not: whoever waits for it, in whatever
+/// state, is then told that it is gone.
+class Watch {
+ public:
+  Watch(const DimseChild& child, const std::function<void()>& keep_going)
+      : thread_([this, &child, &keep_going](const std::stop_token& over) { run(over, child, keep_going); }) {}
+
+  /// Throws what `keep_going` did.
+  void end() {
+    thread_.request_stop();
+    if (thread_.joinable()) thread_.join();
+    if (thrown_) std::rethrow_exception(std::exchange(thrown_, nullptr));
+  }
+
+ private:
+  void run(const std::stop_token& over, const DimseChild& child, const std::function<void()>& keep_going) {
+    constexpr std::chrono::milliseconds kPause{100};
+    std::mutex mutex;
+    std::condition_variable_any woken;
+    std::unique_lock lock(mutex);
+    try {
+      while (!over.stop_requested()) {
+        keep_going();
+        woken.wait_for(lock, over, kPause, [] { return false; });
+      }
+    } catch (...) {
+      thrown_ = std::current_exception();
+      child.kill();
+    }
+  }
+
+  std::exception_ptr thrown_;
+  std::jthread thread_;  // last: it uses the above
+};
 
 /// One association, from the request on.
 class Storing {
@@ -77,17 +116,14 @@ bool start(std::optional<DimseChild>& child) {
   }
 }
 
-}  // namespace
-
-tl::expected<void, NodeFailure> store_instances(
-    const Node& node, const std::filesystem::path& file, std::span<const DicomInstance> instances,
+tl::expected<void, NodeFailure> store_through(
+    DimseChild& child, const Node& node, const std::filesystem::path& file,
+    std::span<const DicomInstance> instances,
     const std::function<void(std::span<const InstanceAnswer>)>& on_answers) {
   std::set<std::string> wanted;
   for (const DicomInstance& instance : instances) wanted.insert(instance.sop_instance_uid);
-  std::optional<DimseChild> child;
-  if (!start(child)) return tl::unexpected(not_started(node));
   try {
-    Storing storing(node, instances, *child);
+    Storing storing(node, instances, child);
     if (auto opened = storing.opened(); !opened) return opened;
     std::optional<NodeFailure> failure;
     for_each_instance(file, [&](const DicomInstance& instance, std::span<const std::byte> bytes) {
@@ -106,6 +142,20 @@ tl::expected<void, NodeFailure> store_instances(
   } catch (const json::exception&) {  // it says what it must not
     return tl::unexpected(connection_lost(node));
   }
+}
+
+}  // namespace
+
+tl::expected<void, NodeFailure> store_instances(
+    const Node& node, const std::filesystem::path& file, std::span<const DicomInstance> instances,
+    const std::function<void(std::span<const InstanceAnswer>)>& on_answers,
+    const std::function<void()>& keep_going) {
+  std::optional<DimseChild> child;
+  if (!start(child)) return tl::unexpected(not_started(node));
+  Watch watch(*child, keep_going);
+  auto sent = store_through(*child, node, file, instances, on_answers);
+  watch.end();
+  return sent;
 }
 
 }  // namespace volsmooth

@@ -9,6 +9,7 @@ namespace volsmooth {
 /// (DICOM PS3.4, annex B).
 tl::expected<void, NodeFailure> store_instances(
     const Node& node, const std::filesystem::path& file, std::span<const DicomInstance> instances,
-    const std::function<void(std::span<const InstanceAnswer>)>& on_answers);
+    const std::function<void(std::span<const InstanceAnswer>)>& on_answers,
+    const std::function<void()>& keep_going);
 
 }  // namespace volsmooth

@@ -34,10 +34,11 @@ Pacs make_pacs(std::vector<Node> nodes, std::vector<Preset> presets, std::int64_
     return instances;
   };
   pacs.send = [find](const std::string& name, const std::filesystem::path& file,
-                     std::span<const DicomInstance> instances, const auto& on_answers) {
+                     std::span<const DicomInstance> instances, const auto& on_answers,
+                     const auto& keep_going) {
     return find(name).and_then([&](const Node& node) {
-      return node.dimse ? store_instances(node, file, instances, on_answers)
-                        : send_instances(node, file, instances, on_answers);
+      return node.dimse ? store_instances(node, file, instances, on_answers, keep_going)
+                        : send_instances(node, file, instances, on_answers, keep_going);
     });
   };
   return pacs;

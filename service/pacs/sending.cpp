@@ -55,12 +55,14 @@ class Batch {
   bool empty() const { return uids_.empty(); }
   bool full() const { return body_.size() >= kBatchBytes; }
 
-  tl::expected<std::vector<InstanceAnswer>, NodeFailure> send(const Node& node) {
+  tl::expected<std::vector<InstanceAnswer>, NodeFailure> send(const Node& node,
+                                                              const std::function<void()>& keep_going) {
     body_ += "--" + kBoundary + "--\r\n";
     NodeRequest request{"/studies",
                         {"Content-Type: multipart/related; type=\"application/dicom\"; boundary=" + kBoundary,
                          "Accept: application/dicom+json"}};
     request.body = &body_;
+    request.keep_going = keep_going;
     const auto answer = exchange(node, request);
     if (!answer) return tl::unexpected(answer.error());
     if (answer->status != kOk && answer->status != kAccepted && answer->status != kConflict)
@@ -102,13 +104,14 @@ std::vector<InstanceAnswer> answers_from(const NodeAnswer& answer, std::span<con
 
 tl::expected<void, NodeFailure> send_instances(
     const Node& node, const std::filesystem::path& file, std::span<const DicomInstance> instances,
-    const std::function<void(std::span<const InstanceAnswer>)>& on_answers) {
+    const std::function<void(std::span<const InstanceAnswer>)>& on_answers,
+    const std::function<void()>& keep_going) {
   std::set<std::string> wanted;
   for (const DicomInstance& instance : instances) wanted.insert(instance.sop_instance_uid);
   Batch batch;
   std::optional<NodeFailure> failure;
   const auto send = [&] {
-    if (const auto answers = std::exchange(batch, {}).send(node)) {
+    if (const auto answers = std::exchange(batch, {}).send(node, keep_going)) {
       on_answers(*answers);
     } else {
       failure = answers.error();

@@ -15,7 +15,7 @@ using testing::HasSubstr;
 
 /// A node that does what the test says: is down, has a series, refuses instances.
 struct FakeNode {
-  std::atomic<bool> up = true, has_series = true;
+  std::atomic<bool> up = true, has_series = true, silent = false;
   std::atomic<int> asked = 0;
   std::mutex mutex;
   std::vector<std::string> received;
@@ -41,9 +41,13 @@ struct FakeNode {
       return std::vector<DicomInstance>{{"1.2", stem + ".1", {}}, {"1.2", stem + ".2", {}}};
     };
     pacs.send = [this](const std::string&, const std::filesystem::path&,
-                       std::span<const DicomInstance> instances,
-                       const auto& on_answers) -> tl::expected<void, NodeFailure> {
+                       std::span<const DicomInstance> instances, const auto& on_answers,
+                       const auto& keep_going) -> tl::expected<void, NodeFailure> {
       ++asked;
+      for (int tries = 0; silent && tries < 6000; ++tries) {
+        keep_going();
+        std::this_thread::sleep_for(10ms);
+      }
       for (const DicomInstance& instance : instances) {
         if (!up) return tl::unexpected(down());
         const bool stored = instance.sop_instance_uid != refuses;
@@ -239,6 +243,19 @@ TEST_F(PacsJobs, DeliveryGoesOnAfterARestart) {
     std::this_thread::sleep_for(1ms);
   service_.reset();
   node_.up = true;
+  open();
+  EXPECT_EQ(delivered(id, DeliveryState::kDelivered).delivery->stored, 2);
+}
+
+TEST_F(PacsJobs, AStopDoesNotWaitForASilentNode) {
+  node_.silent = true;
+  open();
+  const std::string id = service_->submit(delivery_order()).value().id;
+  while (node_.asked == 0) std::this_thread::sleep_for(1ms);
+  const auto begin = std::chrono::steady_clock::now();
+  service_.reset();
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, 10s);
+  node_.silent = false;
   open();
   EXPECT_EQ(delivered(id, DeliveryState::kDelivered).delivery->stored, 2);
 }

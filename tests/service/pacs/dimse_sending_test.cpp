@@ -5,6 +5,8 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include "tests/service/pacs/silent_peer.h"
+
 namespace volsmooth {
 namespace {
 
@@ -30,7 +32,8 @@ class FewDescriptors {
 TEST(DimseSending, WantOfDescriptorsPasses) {
   for (const int spare : {0, 1}) {
     const FewDescriptors few(spare);
-    const auto sent = store_instances(kNode, "/nowhere", {}, [](auto) {});
+    const auto sent = store_instances(
+        kNode, "/nowhere", {}, [](auto) {}, [] {});
     ASSERT_FALSE(sent);
     EXPECT_TRUE(sent.error().is_passing);
     EXPECT_EQ(sent.error().problem.slug, "not-ready");
@@ -38,10 +41,21 @@ TEST(DimseSending, WantOfDescriptorsPasses) {
 }
 
 TEST(DimseSending, APeerThatIsNotThereIsUnreachable) {
-  const auto sent = store_instances(kNode, "/nowhere", {}, [](auto) {});
+  const auto sent = store_instances(
+      kNode, "/nowhere", {}, [](auto) {}, [] {});
   ASSERT_FALSE(sent);
   EXPECT_TRUE(sent.error().is_passing);
   EXPECT_EQ(sent.error().problem.slug, "node-unreachable");
+}
+
+TEST(DimseSending, DoesNotWaitForASilentPeerWhenItIsToEnd) {
+  const SilentPeer peer;
+  const Node node{.name = "silent", .dimse = DimsePeer{"127.0.0.1", peer.port(), "THEM", "US"}};
+  const std::vector<DicomInstance> instances = {{"1.2.840.10008.5.1.4.1.1.2", "1.2.3", "out.zip"}};
+  expect_to_end_when_told([&](const auto& keep_going) {
+    return store_instances(
+        node, "out.zip", instances, [](const auto&) {}, keep_going);
+  });
 }
 
 }  // namespace

@@ -1,6 +1,9 @@
 #include "service/pacs/sending.h"
 
-#include <gtest/gtest.h>
+#include "service/pacs/instances.h"
+#include "tests/service/pacs/silent_peer.h"
+#include "tests/support/dicom_maker.h"
+#include "tests/support/scratch_folder.h"
 
 namespace volsmooth {
 namespace {
@@ -36,6 +39,20 @@ TEST(Sending, ARefusalStandsWhateverTheStatus) {
 TEST(Sending, AConflictWithoutAListStoresNothing) {
   for (const char* body : {"", "[]", R"({"00081199": 5})", R"({"00081199": {"Value": [{"00081155": {}}]}})"})
     EXPECT_EQ(outcome({409, "", body}).find("stored;"), std::string::npos) << body;
+}
+
+TEST(Sending, DoesNotWaitForASilentNodeWhenItIsToEnd) {
+  const SilentPeer peer;
+  const Node node{"silent", "http://127.0.0.1:" + std::to_string(peer.port())};
+  const ScratchFolder folder;
+  const auto file = folder.put("out.dcm", test::files_of(test::series_of({}))[0]);
+  std::vector<DicomInstance> instances;
+  for_each_instance(file, [&](const DicomInstance& instance, auto) { instances.push_back(instance); });
+  ASSERT_EQ(instances.size(), 1U);
+  expect_to_end_when_told([&](const auto& keep_going) {
+    return send_instances(
+        node, file, instances, [](const auto&) {}, keep_going);
+  });
 }
 
 }  // namespace
