@@ -50,6 +50,16 @@ double rounded(double number) {
   return number + kNoFraction - kNoFraction;
 }
 
+struct Rescale {
+  double slope, intercept;
+};
+
+/// The stored value before it is clipped; beyond the range by one at the most.
+double whole_value(float intensity, const Rescale& rescale, double lowest, double highest) {
+  const double exact = (static_cast<double>(intensity) - rescale.intercept) / rescale.slope;
+  return rounded(lower(higher(exact, lowest - 1), highest + 1));
+}
+
 /// Stored values behind `out`; the number of clipped ones. Part by part, in loops that become vector
 /// instructions.
 template <class Cell>
@@ -58,15 +68,13 @@ std::int64_t store(std::span<const float> intensities, const DicomSlice& slice, 
   constexpr std::size_t kPart = 1024;
   std::array<double, kPart> whole;
   std::array<Cell, kPart> cells;
-  const double slope = slice.rescale_slope, intercept = slice.rescale_intercept;
+  const Rescale rescale{slice.rescale_slope, slice.rescale_intercept};
   const auto lowest = static_cast<double>(range.lowest), highest = static_cast<double>(range.highest);
   std::int64_t clipped = 0;
   for (std::size_t begin = 0; begin < intensities.size(); begin += kPart) {
     const std::size_t count = std::min(kPart, intensities.size() - begin);
-    for (std::size_t i = 0; i < count; ++i) {
-      const double exact = (static_cast<double>(intensities[begin + i]) - intercept) / slope;
-      whole[i] = rounded(lower(higher(exact, lowest - 1), highest + 1));
-    }
+    for (std::size_t i = 0; i < count; ++i)
+      whole[i] = whole_value(intensities[begin + i], rescale, lowest, highest);
     for (std::size_t i = 0; i < count; ++i)
       cells[i] = static_cast<Cell>(static_cast<std::int32_t>(lower(higher(whole[i], lowest), highest)));
     for (std::size_t i = 0; i < count; ++i)
@@ -76,18 +84,28 @@ std::int64_t store(std::span<const float> intensities, const DicomSlice& slice, 
   return clipped;
 }
 
-/// Gives back the padding of the original, and lets nothing else be padding.
+/// Gives back the padding of the original, and lets nothing else be padding. The number of voxels that are
+/// padding again and would have been clipped.
 template <class Cell>
-void restore_padding(std::span<const std::int32_t> original, const DicomSlice& slice, const Range& range,
-                     std::byte* out) {
+std::int64_t restore_padding(std::span<const float> intensities, std::span<const std::int32_t> original,
+                             const DicomSlice& slice, const Range& range, std::byte* out) {
   const auto [lowest, highest] = *slice.padding;
+  const Rescale rescale{slice.rescale_slope, slice.rescale_intercept};
+  const auto least = static_cast<double>(range.lowest), most = static_cast<double>(range.highest);
+  std::int64_t clipped = 0;
   for (std::size_t i = 0; i < original.size(); ++i) {
     Cell cell;
     std::memcpy(&cell, out + i * sizeof(Cell), sizeof(Cell));
-    const bool was_padding = original[i] >= lowest && original[i] <= highest;
-    cell = static_cast<Cell>(was_padding ? original[i] : beside(cell, slice, range));
+    if (original[i] >= lowest && original[i] <= highest) {
+      const double whole = whole_value(intensities[i], rescale, least, most);
+      clipped += static_cast<std::int64_t>(whole < least || whole > most);
+      cell = static_cast<Cell>(original[i]);
+    } else {
+      cell = static_cast<Cell>(beside(cell, slice, range));
+    }
     std::memcpy(out + i * sizeof(Cell), &cell, sizeof(Cell));
   }
+  return clipped;
 }
 
 template <class Cell>
@@ -98,8 +116,8 @@ std::int64_t append_cells(std::span<const float> intensities, const DicomSlice& 
   const std::size_t at = into.size();
   into.resize(at + intensities.size() * sizeof(Cell));
   const std::int64_t clipped = store<Cell>(intensities, slice, range, into.data() + at);
-  if (slice.padding) restore_padding<Cell>(original, slice, range, into.data() + at);
-  return clipped;
+  if (!slice.padding) return clipped;
+  return clipped - restore_padding<Cell>(intensities, original, slice, range, into.data() + at);
 }
 
 }  // namespace

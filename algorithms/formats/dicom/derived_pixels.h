@@ -15,7 +15,8 @@ std::span<const float> plane_at_slice(const DicomSeries& series, std::span<const
                                       std::size_t which, std::vector<float>& mixed);
 
 /// Stored values of a slice, little-endian, behind `into`. `original`: the stored values that a slice with a
-/// padding value had, of which those that are padding are written again. The number of clipped voxels.
+/// padding value had, of which those that are padding are written again. The number of clipped voxels beside
+/// those.
 std::int64_t append_stored(std::span<const float> intensities, const DicomSlice& slice,
                            const PixelFormat& format, std::span<const std::int32_t> original,
                            std::vector<std::byte>& into);

@@ -155,6 +155,17 @@ TEST(DerivedSeries, PutsPaddingBackAndMakesNoMore) {
   EXPECT_NEAR(derived.again.voxels[20], -3024, 1);
 }
 
+/// What a method makes of padding is not in the result, so it is not clipped either.
+TEST(DerivedSeries, CountsNoPaddingAsClipped) {
+  const SeriesInMemory source = read(padded_series());
+  std::vector<float> voxels(source.voxels.size(), 100);
+  voxels[0] = 1e6F;
+  voxels[1] = -1e6F;
+  EXPECT_EQ(test::derive(source, voxels).counts.clipped_voxels, 0);
+  voxels[5] = 1e6F;
+  EXPECT_EQ(test::derive(source, voxels).counts.clipped_voxels, 1);
+}
+
 TEST(DerivedSeries, IsInTheSameStudyWithANewIdentity) {
   const SeriesInMemory source = read(test::series_of({}));
   const auto derived = test::derive(source, source.voxels);
