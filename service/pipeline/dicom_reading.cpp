@@ -163,6 +163,8 @@ tl::expected<InputVolume, Problem> read_dicom(const std::filesystem::path& file,
     auto bits = read_values<std::uint8_t>(reader, (static_cast<std::size_t>(count) + 7) / 8);
     input.padding = Padding(std::move(bits), read_values<float>(reader, padded));
   }
+  const auto bytes = static_cast<off_t>(voxels_of(*input.volume).size_bytes());
+  check(::ftruncate(voxels.get(), bytes) == 0, "giving back the memory of the padding");
   return input;
 }
 

@@ -15,7 +15,7 @@ nlohmann::json ingest_options(const UploadOptions& options, const PipelineLimits
                               std::int64_t upload_bytes, std::int64_t voxels);
 
 /// As `describe_volume` and `read_volume`, by volsmooth-ingest. `kept`: an empty memory file that the voxels
-/// are decoded to and that keeps its memory.
+/// are decoded to and that keeps their memory.
 tl::expected<VolumeDescription, Problem> describe_dicom(const std::filesystem::path& file,
                                                         const UploadOptions& options,
                                                         const PipelineLimits& limits, const Progress& report);

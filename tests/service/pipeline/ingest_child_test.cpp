@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <fstream>
@@ -162,8 +163,11 @@ TEST(IngestedUpload, PaddingComesBackWhereItWas) {
   const auto file = folder.put("upload", test::multipart_of(test::files_of(series)));
   StoredVolume stored;
   stored.facts.size = {5, 3, 3};
-  auto read = read_dicom(file, stored, {}, no_progress);
+  const Descriptor kept = memory_file("voxels");
+  auto read = read_dicom(file, stored, {}, no_progress, &kept);
   ASSERT_TRUE(read);
+  EXPECT_EQ(::lseek(kept.get(), 0, SEEK_END), off_t{5 * 3 * 3 * sizeof(float)})
+      << "the padding is not held twice";
   const auto voxels = voxels_of(*read->volume);
   const std::vector<float> filled(voxels.begin(), voxels.end());
   for (const std::size_t pixel : {15U, 22U, 29U}) {
