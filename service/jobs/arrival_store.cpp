@@ -14,18 +14,17 @@ std::vector<std::string> texts_of(Statement row) {
 
 }  // namespace
 
-void ArrivalStore::add(std::string_view preset, std::string_view file,
+bool ArrivalStore::add(std::string_view preset, std::string_view file,
                        const std::vector<ArrivedInstance>& instances) {
-  database_.write([&](Database& database) {
+  return database_.write([&](Database& database) {
     for (const ArrivedInstance& instance : instances)
       database.run(
-          "INSERT OR IGNORE INTO arrivals (preset, study, series, sop_instance_uid, file, offset, bytes, "
-          "received_ms) "
-          "VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+          "INSERT INTO arrivals (preset, study, series, sop_instance_uid, file, offset, bytes, received_ms) "
+          "VALUES (?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT DO UPDATE SET received_ms = excluded.received_ms",
           preset, instance.study_uid, instance.series_uid, instance.sop_instance_uid, file, instance.offset,
           instance.bytes, milliseconds_of(now_in_milliseconds()));
     audit(database, preset, "instances received");
-    return true;
+    return database.query("SELECT 1 FROM arrivals WHERE file = ? LIMIT 1", file).step();
   });
 }
 
@@ -53,16 +52,7 @@ std::vector<ArrivedPart> ArrivalStore::parts_of(std::string_view job_id) {
 }
 
 std::vector<std::string> ArrivalStore::forget(std::string_view job_id) {
-  return database_.write([&](Database& database) {
-    constexpr std::string_view kOfJob = "job = (SELECT sequence FROM jobs WHERE id = ?1)";
-    const std::string of_job(kOfJob);
-    auto files = texts_of(database.query("SELECT DISTINCT file FROM arrivals AS mine WHERE " + of_job +
-                                             " AND NOT EXISTS (SELECT 1 FROM arrivals AS other WHERE "
-                                             "other.file = mine.file AND other.job IS NOT mine.job)",
-                                         job_id));
-    database.run("DELETE FROM arrivals WHERE " + of_job, job_id);
-    return files;
-  });
+  return database_.write([&](Database& database) { return forget_arrivals(database, job_id); });
 }
 
 std::vector<std::string> ArrivalStore::files() {
@@ -75,6 +65,16 @@ void hand_over(Database& database, const DicomSource& series, std::string_view j
       "UPDATE arrivals SET job = (SELECT sequence FROM jobs WHERE id = ?1) "
       "WHERE preset = ?2 AND study = ?3 AND series = ?4 AND job IS NULL",
       job_id, series.preset, series.study, series.series);
+}
+
+std::vector<std::string> forget_arrivals(Database& database, std::string_view job_id) {
+  const std::string of_job = "job = (SELECT sequence FROM jobs WHERE id = ?1)";
+  auto files = texts_of(database.query("SELECT DISTINCT file FROM arrivals AS mine WHERE " + of_job +
+                                           " AND NOT EXISTS (SELECT 1 FROM arrivals AS other WHERE "
+                                           "other.file = mine.file AND other.job IS NOT mine.job)",
+                                       job_id));
+  database.run("DELETE FROM arrivals WHERE " + of_job, job_id);
+  return files;
 }
 
 std::string new_arrival_file() {

@@ -17,19 +17,21 @@ struct ArrivedPart {
 };
 
 /// Rows of the instances that devices sent to a preset: they wait until their series is whole, belong to its
-/// job from then on, and go when the job has its volume or is final. Thread-safe; throws DatabaseError.
+/// job from then on, and go when the job has its volume, is cancelled or deleted. Thread-safe; throws
+/// DatabaseError.
 class ArrivalStore {
  public:
   explicit ArrivalStore(StoreDatabase& database) : database_(database) {}
 
-  /// One that waits already is not taken again: devices send again what they had no answer for.
-  void add(std::string_view preset, std::string_view file, const std::vector<ArrivedInstance>& instances);
+  /// One that waits already stays as it is, but its series is not quiet: devices send again what they had no
+  /// answer for. False: all were such, and nothing is in the file that is not in others.
+  bool add(std::string_view preset, std::string_view file, const std::vector<ArrivedInstance>& instances);
 
   /// A series of that preset of which nothing has arrived since.
   std::optional<DicomSource> quiet_since(const std::string& preset, Time since);
 
   std::vector<ArrivedPart> parts_of(std::string_view job_id);
-  /// Forgets the instances of a job; returns the files that are nobody's any more.
+  /// `forget_arrivals`, in a transaction of its own.
   std::vector<std::string> forget(std::string_view job_id);
 
   std::vector<std::string> files();  ///< those that a row points to
@@ -40,6 +42,9 @@ class ArrivalStore {
 
 /// What has arrived of a series is that job's from now on; part of the transaction that inserts it.
 void hand_over(Database& database, const DicomSource& series, std::string_view job_id);
+
+/// Forgets the instances of a job, likewise; returns the files that are nobody's any more.
+std::vector<std::string> forget_arrivals(Database& database, std::string_view job_id);
 
 /// A new place for an arriving file below the data directory.
 std::string new_arrival_file();

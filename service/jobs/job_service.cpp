@@ -90,7 +90,7 @@ tl::expected<std::vector<ArrivedInstance>, Problem> JobService::receive(std::str
   const std::string place = new_arrival_file();
   state_->files.adopt(std::move(file), place);
   try {
-    state_->arrivals.add(preset, place, *instances);
+    if (!state_->arrivals.add(preset, place, *instances)) state_->files.remove(place);
   } catch (...) {
     if (!state_->database.condemned()) state_->files.remove(place);
     throw;
@@ -210,6 +210,7 @@ tl::expected<bool, Problem> JobService::delete_job(std::string_view id,
   if (!removed) return state_->unless_gone(id, "job").map([] { return true; });
   if (!removed->removed) return false;
   if (const auto running = state_->running.find(id)) running->interrupt(RunningJob::Interruption::kCancel);
+  for (const std::string& file : removed->arrived_files) state_->files.remove(file);
   if (removed->job.state == JobState::kSucceeded) state_->files.remove(results_directory(removed->job));
   if (!removed->was_final) state_->tell_final(removed->job);
   state_->wakes.wake(removed->job.id);

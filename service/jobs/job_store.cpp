@@ -2,6 +2,7 @@
 
 #include <stdexcept>
 
+#include "service/jobs/arrival_store.h"
 #include "service/jobs/delivery_store.h"
 #include "service/jobs/job_json.h"
 #include "service/jobs/stored_json.h"
@@ -246,10 +247,11 @@ std::optional<JobStore::Removal> JobStore::remove(std::string_view id,
       change_in(database, {job->id, job->attempt, job->state, JobState::kCancelled, job->progress});
       job = find_in(database, id);
     }
+    auto arrived_files = forget_arrivals(database, id);
     database.run("DELETE FROM jobs WHERE id = ?", id);
     bury(database, id);
     audit(database, id, "job deleted");
-    return Removal{*std::move(job), was_final, true};
+    return Removal{*std::move(job), was_final, true, std::move(arrived_files)};
   });
 }
 

@@ -71,6 +71,7 @@ class JobStore {
     Job job;  ///< at the end
     bool was_final;
     bool removed;
+    std::vector<std::string> arrived_files = {};  ///< to be removed: only the job needed them
   };
   std::optional<Removal> remove(std::string_view id, const std::function<bool(const Job&)>& is_wanted);
 

@@ -12,6 +12,7 @@ struct Problem {
   std::string detail;  ///< what was wrong and what would be right; echoes no input bytes
   nlohmann::json members =
       nlohmann::json::object();  ///< members of its own, such as the limit that was exceeded
+  bool is_passing = false;       ///< the same may go well another time
 };
 
 }  // namespace volsmooth

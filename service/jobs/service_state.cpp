@@ -137,7 +137,8 @@ bool JobService::State::settle(const JobChange& change) {
   try {
     if (is_final(change.to) || change.retrieved)
       if (const auto job = jobs.find(change.id)) {
-        forget_arrivals(*job);
+        // The arrivals of a job that failed without a volume are all that there is of an acknowledged series.
+        if (job->state == JobState::kCancelled || !job->order.volume.empty()) forget_arrivals(*job);
         if (job->delivery) delivering.wake();
         if (is_final(change.to)) tell_final(*job);
       }

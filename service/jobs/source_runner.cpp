@@ -64,7 +64,10 @@ tl::expected<StoredVolume, NodeFailure> SourceRunner::retrieve(ClaimedJob& claim
   volume.bytes = file.bytes();
   volume.created_at = now_in_milliseconds();
   auto facts = engine_.inspect(file.path(), volume.options, [&](double) { running.throw_if_interrupted(); });
-  if (!facts) return tl::unexpected(NodeFailure{std::move(facts.error()), false});
+  if (!facts) {
+    const bool is_passing = facts.error().is_passing;
+    return tl::unexpected(NodeFailure{std::move(facts.error()), is_passing});
+  }
   volume.facts = *std::move(facts);
   return volume;
 }

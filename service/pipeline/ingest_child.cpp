@@ -34,6 +34,13 @@ Problem decode_failed(const char* detail) {
   return {"dicom-decode-failed", detail};
 }
 
+/// Of a child that was killed or is slow, which the machine may be the reason for.
+Problem decode_failed_this_time(const char* detail) {
+  Problem problem = decode_failed(detail);
+  problem.is_passing = true;
+  return problem;
+}
+
 /// What the child has open: those, on the numbers that they stand at in `descriptors`, and nothing else.
 class SpawnActions {
  public:
@@ -174,12 +181,14 @@ tl::expected<Json, Problem> run_ingest(const std::filesystem::path& program, con
   const auto end = Clock::now() + order.patience;
   while (!child.has_ended()) {
     report(told_by(progress.get()));
-    if (Clock::now() > end) return tl::unexpected(decode_failed("Reading the DICOM files took too long."));
+    if (Clock::now() > end)
+      return tl::unexpected(decode_failed_this_time("Reading the DICOM files took too long."));
   }
   const int code = child.code();
   if (code == kNoSandbox) throw std::runtime_error("volsmooth-ingest has no sandbox");
   if (code != 0) {
-    return tl::unexpected(decode_failed(
+    const auto failed = code < 0 ? decode_failed_this_time : decode_failed;
+    return tl::unexpected(failed(
         "The DICOM files brought their reader down: they are damaged, or larger than this server takes."));
   }
   return parsed(content_of(answer.get()));

@@ -323,10 +323,20 @@ class PresetJobs : public JobServiceTest {
   void open(std::chrono::milliseconds quiet = 1ms) {
     auto engine = fake_.engine();
     engine.instances = instances_of_digits;
+    if (inspect_)
+      engine.inspect = [this, taken = engine.inspect](
+                           const auto& file, const auto& options,
+                           const auto& report) -> tl::expected<VolumeFacts, Problem> {
+        if (auto problem = inspect_()) return tl::unexpected(*std::move(problem));
+        return taken(file, options, report);
+      };
     Pacs pacs;
     pacs.presets = {{"head", JobOrder{}, quiet}};
     pacs.presets[0].order.label = "sent";
-    service_ = std::make_unique<JobService>(settings(), engine, pacs);
+    service_.reset();
+    JobServiceSettings given = settings();
+    given.longest_node_pause = 20ms;
+    service_ = std::make_unique<JobService>(given, engine, pacs);
     service_->start();
   }
 
@@ -349,6 +359,8 @@ class PresetJobs : public JobServiceTest {
     if (!std::filesystem::exists(folder)) return 0;
     return std::distance(std::filesystem::directory_iterator(folder), {});
   }
+
+  std::function<std::optional<Problem>()> inspect_;  ///< says what is wrong with a whole series
 };
 
 TEST_F(PresetJobs, WhatArrivesInPiecesBecomesOneJobASeries) {
@@ -377,6 +389,74 @@ TEST_F(PresetJobs, WhatIsSentAgainIsTakenOnce) {
   std::ifstream in(service_->volume_content(done.order.volume)->path);
   const std::string body((std::istreambuf_iterator<char>(in)), {});
   EXPECT_EQ(body.find("Content-Type"), body.rfind("Content-Type"));
+}
+
+TEST_F(PresetJobs, WhatIsSentAgainTakesNoRoom) {
+  open(1h);
+  for (int time = 0; time < 3; ++time) ASSERT_TRUE(send("1"));
+  EXPECT_EQ(arrived_files(), 1);
+  ASSERT_TRUE(send("11"));  // other instances, of the same series
+  EXPECT_EQ(arrived_files(), 2);
+}
+
+/// A device that lost its connection begins again with the first slice, and needs longer than the quiet time
+/// to come to those that are new.
+TEST_F(PresetJobs, ASeriesIsNotQuietWhileItIsSentAgain) {
+  constexpr auto kQuiet = 1s;
+  open(kQuiet);
+  const auto begin = std::chrono::steady_clock::now();
+  while (std::chrono::steady_clock::now() - begin < 2 * kQuiet) {
+    ASSERT_TRUE(send("1"));
+    std::this_thread::sleep_for(20ms);
+  }
+  ASSERT_TRUE(send("11"));
+  const auto jobs = jobs_once_there_are(1);
+  const Job done = wait_for(*service_, jobs[0].id);
+  std::ifstream in(service_->volume_content(done.order.volume)->path);
+  const std::string body((std::istreambuf_iterator<char>(in)), {});
+  std::size_t parts = 0;
+  for (std::size_t at = 0; (at = body.find("Content-Type", at)) != std::string::npos; ++at) ++parts;
+  EXPECT_EQ(parts, 3U) << body;
+}
+
+/// They were acknowledged, and nothing else holds the series.
+TEST_F(PresetJobs, AJobThatFailsWithoutAVolumeKeepsItsArrivalsUntilItIsDeleted) {
+  inspect_ = [] { return Problem{"dicom-decode-failed", "Damaged."}; };
+  open();
+  ASSERT_TRUE(send("1"));
+  const std::string id = jobs_once_there_are(1)[0].id;
+  EXPECT_EQ(wait_for(*service_, id).state, JobState::kFailed);
+  service_->stop();
+  EXPECT_EQ(arrived_files(), 1);
+  open();
+  EXPECT_EQ(arrived_files(), 1);
+  ASSERT_TRUE(service_->delete_job(id));
+  EXPECT_EQ(arrived_files(), 0);
+}
+
+TEST_F(PresetJobs, AReaderThatWasKilledIsTriedAgain) {
+  std::atomic<int> tries = 0;
+  inspect_ = [&]() -> std::optional<Problem> {
+    if (++tries > 2) return std::nullopt;
+    return Problem{.slug = "dicom-decode-failed", .detail = "Killed.", .is_passing = true};
+  };
+  open();
+  ASSERT_TRUE(send("1"));
+  EXPECT_EQ(wait_for(*service_, jobs_once_there_are(1)[0].id).state, JobState::kSucceeded);
+  EXPECT_EQ(tries, 3);
+  service_->stop();
+  EXPECT_EQ(arrived_files(), 0);
+}
+
+TEST_F(PresetJobs, ACancelledJobFreesItsArrivals) {
+  inspect_ = [] { return Problem{.slug = "dicom-decode-failed", .detail = "Killed.", .is_passing = true}; };
+  open();
+  ASSERT_TRUE(send("1"));
+  const std::string id = jobs_once_there_are(1)[0].id;
+  ASSERT_TRUE(service_->cancel(id));
+  EXPECT_EQ(wait_for(*service_, id).state, JobState::kCancelled);
+  service_->stop();
+  EXPECT_EQ(arrived_files(), 0);
 }
 
 TEST_F(PresetJobs, ArrivalsSurviveARestart) {

@@ -57,6 +57,14 @@ TEST(IngestChild, DeathIsAProblemOfTheUpload) {
   }
 }
 
+/// Memory and time are lacking today, damage stays.
+TEST(IngestChild, WhatKillsItOrMakesItSlowIsPassing) {
+  EXPECT_TRUE(run_script("kill -KILL $$").error().is_passing);
+  EXPECT_TRUE(run_script("exec sleep 60", std::chrono::seconds(0)).error().is_passing);
+  EXPECT_FALSE(run_script("exit 1").error().is_passing);
+  EXPECT_FALSE(run_script("echo no JSON").error().is_passing);
+}
+
 /// Ctrl-C and a stop by systemd go to the children as well, whose work the daemon still needs to end in
 /// order.
 TEST(IngestChild, WhatEndsTheDaemonDoesNotEndIt) {
