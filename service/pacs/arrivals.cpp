@@ -13,8 +13,8 @@ constexpr std::uint16_t kOtherThanAnnounced = 0xB007;  ///< a warning: it is sto
 
 std::uint16_t status_of(const Problem& problem) {
   constexpr const char* kOfResources[] = {"insufficient-storage", "not-ready", "queue-full"};
-  return std::ranges::find(kOfResources, problem.slug) == std::end(kOfResources) ? kCannotUnderstand
-                                                                                 : kOutOfResources;
+  const bool of_resources = std::ranges::find(kOfResources, problem.slug) != std::end(kOfResources);
+  return of_resources || problem.is_passing ? kOutOfResources : kCannotUnderstand;
 }
 
 void Arrivals::take(std::string_view bytes) {

@@ -34,7 +34,7 @@ Problem decode_failed(const char* detail) {
   return {"dicom-decode-failed", detail};
 }
 
-/// Of a child that was killed or is slow, which the machine may be the reason for.
+/// Of a child that was killed or is slow: the machine may be the reason.
 Problem decode_failed_this_time(const char* detail) {
   Problem problem = decode_failed(detail);
   problem.is_passing = true;
@@ -112,12 +112,12 @@ class Child {
     return ended.si_pid == process_;
   }
 
-  /// Its exit code; -1 after a signal.
+  /// Its exit code, or minus the signal that ended it.
   int code() {
     int status = 0;
     while (::waitpid(process_, &status, 0) < 0 && errno == EINTR) continue;
     process_ = -1;
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
   }
 
  private:
@@ -187,7 +187,8 @@ tl::expected<Json, Problem> run_ingest(const std::filesystem::path& program, con
   const int code = child.code();
   if (code == kNoSandbox) throw std::runtime_error("volsmooth-ingest has no sandbox");
   if (code != 0) {
-    const auto failed = code < 0 ? decode_failed_this_time : decode_failed;
+    // Want of memory kills from outside; by a fault of its own, a file would bring it down every time.
+    const auto failed = code == -SIGKILL ? decode_failed_this_time : decode_failed;
     return tl::unexpected(failed(
         "The DICOM files brought their reader down: they are damaged, or larger than this server takes."));
   }

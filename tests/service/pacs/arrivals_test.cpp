@@ -75,6 +75,13 @@ TEST_F(ArrivalsAt, AProblemHasItsStatus) {
     }
 }
 
+TEST_F(ArrivalsAt, WhatMayPassIsWorthAnotherTry) {
+  Problem killed{"dicom-decode-failed", "The reader was killed."};
+  EXPECT_EQ(status_of(killed), 0xC000);
+  killed.is_passing = true;
+  EXPECT_EQ(status_of(killed), 0xA700);
+}
+
 TEST_F(ArrivalsAt, AStoreThatFailsIsWorthAnotherTry) {
   breaks_ = true;
   EXPECT_EQ(status_of_one("x"), 0xA700);

@@ -61,8 +61,8 @@ TEST(IngestChild, DeathIsAProblemOfTheUpload) {
 TEST(IngestChild, WhatKillsItOrMakesItSlowIsPassing) {
   EXPECT_TRUE(run_script("kill -KILL $$").error().is_passing);
   EXPECT_TRUE(run_script("exec sleep 60", std::chrono::seconds(0)).error().is_passing);
-  EXPECT_FALSE(run_script("exit 1").error().is_passing);
-  EXPECT_FALSE(run_script("echo no JSON").error().is_passing);
+  for (const char* damage : {"kill -SEGV $$", "kill -SYS $$", "exit 1", "echo no JSON"})
+    EXPECT_FALSE(run_script(damage).error().is_passing) << damage;
 }
 
 /// Ctrl-C and a stop by systemd go to the children as well, whose work the daemon still needs to end in
