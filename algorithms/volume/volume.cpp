@@ -6,6 +6,7 @@
 #include "algorithms/volume/parallel.h"
 
 namespace volsmooth {
+
 Volume::Pointer make_volume(const Size3& size, const VoxelToWorld& map) {
   const VoxelToWorld lps = in_frame(map, Frame::kLps);
   const Vector3 spacing = spacing_of(map);

@@ -12,6 +12,7 @@
 #include "algorithms/formats/nifti_header_for.h"
 #include "algorithms/volume/parallel.h"
 #include "service/pipeline/ingest_child.h"
+#include "service/process/check.h"
 
 namespace volsmooth {
 namespace {
@@ -21,10 +22,6 @@ using Json = nlohmann::json;
 constexpr std::int64_t kMiB = std::int64_t{1} << 20;
 constexpr int kMostThreads = 8;  ///< of a child: slices are handed over one by one
 constexpr std::int64_t kStackBytes = 16 * kMiB;
-
-void check(bool done, const char* what) {
-  if (!done) throw std::system_error(errno, std::generic_category(), what);
-}
 
 Descriptor open_upload(const std::filesystem::path& file) {
   Descriptor upload(::open(file.c_str(), O_RDONLY | O_CLOEXEC));

@@ -2,8 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "service/pipeline/descriptor.h"
 #include "service/pipeline/reading.h"
+#include "service/process/descriptor.h"
 
 namespace volsmooth {
 

@@ -16,6 +16,7 @@
 #include "algorithms/formats/mesh_writers.h"
 #include "service/pipeline/dicom_reading.h"
 #include "service/pipeline/ingest_child.h"
+#include "service/process/check.h"
 
 namespace volsmooth {
 namespace {
@@ -24,10 +25,6 @@ using Json = nlohmann::json;
 
 constexpr int kFirstSeriesNumber = 9001;  ///< behind those that devices give
 constexpr std::int64_t kMiB = std::int64_t{1} << 20;
-
-void check(bool done, const char* what) {
-  if (!done) throw std::system_error(errno, std::generic_category(), what);
-}
 
 std::string random_seed() {
   std::array<unsigned char, 16> bytes{};

@@ -9,8 +9,8 @@
 #include "algorithms/surface/mesh.h"
 #include "algorithms/volume/volume.h"
 #include "service/jobs/job.h"
-#include "service/pipeline/descriptor.h"
 #include "service/pipeline/pipeline.h"
+#include "service/process/descriptor.h"
 
 namespace volsmooth {
 

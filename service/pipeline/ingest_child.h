@@ -8,7 +8,7 @@
 
 #include "algorithms/progress.h"
 #include "service/jobs/problem.h"
-#include "service/pipeline/descriptor.h"
+#include "service/process/descriptor.h"
 
 namespace volsmooth {
 

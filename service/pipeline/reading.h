@@ -7,8 +7,8 @@
 
 #include "algorithms/formats/nifti.h"
 #include "service/jobs/job.h"
-#include "service/pipeline/descriptor.h"
 #include "service/pipeline/pipeline.h"
+#include "service/process/descriptor.h"
 
 namespace volsmooth {
 

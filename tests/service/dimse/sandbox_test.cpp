@@ -7,43 +7,26 @@
 #include <signal.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <functional>
 
+#include "tests/support/confined_process.h"
+
 namespace volsmooth {
 namespace {
-
-#ifdef __SANITIZE_ADDRESS__
-constexpr bool kNoSandbox = true;
-#else
-constexpr bool kNoSandbox = false;
-#endif
 
 class DimseSandbox : public testing::Test {
  protected:
   void SetUp() override {
-    if (kNoSandbox) GTEST_SKIP() << "it is not entered under the address sanitizer";
+    if (!test::kConfines) GTEST_SKIP() << "it is not entered under the address sanitizer";
   }
   ~DimseSandbox() override { ::close(socket_); }
 
-  /// How a process ends that does `work` in the sandbox and then exits with 0.
   static int end_of(const std::function<void()>& work) {
-    const pid_t child = ::fork();
-    if (child == 0) {
-      enter_sandbox(std::int64_t{1} << 32);
-      work();
-      ::_exit(0);
-    }
-    int status = 0;
-    ::waitpid(child, &status, 0);
-    return status;
+    return test::end_of([] { enter_sandbox(std::int64_t{1} << 32); }, work);
   }
-  static bool is_forbidden(const std::function<void()>& work) {
-    const int status = end_of(work);
-    return WIFSIGNALED(status) && WTERMSIG(status) == SIGSYS;
-  }
+  static bool is_forbidden(const std::function<void()>& work) { return test::was_forbidden(end_of(work)); }
   int set(int level, int option) const {
     const int yes = 1;
     return ::setsockopt(socket_, level, option, &yes, sizeof yes);

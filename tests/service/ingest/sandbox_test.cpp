@@ -1,37 +1,24 @@
 #include "service/ingest/sandbox.h"
 
 #include <gtest/gtest.h>
-#include <signal.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <functional>
 #include <thread>
 
+#include "tests/support/confined_process.h"
+
 namespace volsmooth {
 namespace {
 
-#ifdef __SANITIZE_ADDRESS__
-constexpr bool kNoSandbox = true;
-#else
-constexpr bool kNoSandbox = false;
-#endif
+using test::was_forbidden;
 
-/// How a process ends that does `work` in the sandbox and then exits with 0.
 int end_of(const std::function<void()>& work) {
-  const pid_t child = ::fork();
-  if (child == 0) {
-    enter_sandbox({.address_space_bytes = std::int64_t{1} << 32, .cpu_seconds = 10, .output_bytes = 0});
-    work();
-    ::_exit(0);
-  }
-  int status = 0;
-  ::waitpid(child, &status, 0);
-  return status;
-}
-
-bool was_forbidden(int status) {
-  return WIFSIGNALED(status) && WTERMSIG(status) == SIGSYS;
+  return test::end_of(
+      [] {
+        enter_sandbox({.address_space_bytes = std::int64_t{1} << 32, .cpu_seconds = 10, .output_bytes = 0});
+      },
+      work);
 }
 
 TEST(Sandbox, ThreadsWork) {
@@ -44,13 +31,13 @@ TEST(Sandbox, ThreadsWork) {
 }
 
 TEST(Sandbox, NoProcessIsStarted) {
-  if (kNoSandbox) GTEST_SKIP() << "it is not entered under the address sanitizer";
+  if (!test::kConfines) GTEST_SKIP() << "it is not entered under the address sanitizer";
   EXPECT_TRUE(was_forbidden(end_of([] { (void)::fork(); })));
   EXPECT_TRUE(was_forbidden(end_of([] { (void)::vfork(); })));
 }
 
 TEST(Sandbox, NothingIsOpened) {
-  if (kNoSandbox) GTEST_SKIP() << "it is not entered under the address sanitizer";
+  if (!test::kConfines) GTEST_SKIP() << "it is not entered under the address sanitizer";
   EXPECT_TRUE(was_forbidden(end_of([] { (void)::access("/", R_OK); })));
 }
 
