@@ -18,14 +18,7 @@ const char* const kStoreUser = "/usr/bin/storescu";
 /// A peer that says what it likes.
 class RawPeer {
  public:
-  explicit RawPeer(int port) {
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_port = htons(static_cast<std::uint16_t>(port));
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    if (connect(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
-      throw std::runtime_error("connect failed");
-  }
+  explicit RawPeer(int port) : socket_(connect_to_loopback(port)) {}
   RawPeer(const RawPeer&) = delete;
   ~RawPeer() { close(socket_); }
 
@@ -42,7 +35,7 @@ class RawPeer {
   }
 
  private:
-  const int socket_ = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  const int socket_;
 };
 
 /// An archive and a daemon that knows it: by DICOMweb as "archive", by DIMSE as "cstore", by a wrong AE title

@@ -6,23 +6,10 @@
 #include <optional>
 
 #include "tests/support/dicom_maker.h"
+#include "tests/support/loopback.h"
 #include "tests/system/service_client.h"
 
 namespace volsmooth::test {
-
-/// Nobody listens on it now.
-inline int free_port() {
-  const int probe = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t size = sizeof address;
-  const bool bound = bind(probe, reinterpret_cast<const sockaddr*>(&address), size) == 0 &&
-                     getsockname(probe, reinterpret_cast<sockaddr*>(&address), &size) == 0;
-  close(probe);
-  if (!bound) throw std::runtime_error("no free port");
-  return ntohs(address.sin_port);
-}
 
 /// A real archive, with DICOMweb and DIMSE.
 class Orthanc {

@@ -11,6 +11,7 @@
 
 #include "service/dimse/part10.h"
 #include "service/pacs/dimse_child.h"
+#include "tests/support/loopback.h"
 #include "tests/support/raw_association.h"
 
 namespace volsmooth {
@@ -26,32 +27,12 @@ const char* const kCtImages = "1.2.840.10008.5.1.4.1.1.2";
 /// Where a peer listens.
 class Place {
  public:
-  Place() {
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    socklen_t length = sizeof address;
-    auto* const any = reinterpret_cast<sockaddr*>(&address);
-    if (::bind(socket_.get(), any, length) != 0 || ::listen(socket_.get(), 1) != 0 ||
-        ::getsockname(socket_.get(), any, &length) != 0)
-      throw std::runtime_error("no place to listen");
-    port_ = ntohs(address.sin_port);
-  }
-  int port() const { return port_; }
+  int port() const { return port_of(socket_.get()); }
   FileDescriptor accepted() const { return FileDescriptor(::accept(socket_.get(), nullptr, nullptr)); }
-  FileDescriptor connected() const {
-    FileDescriptor socket(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    address.sin_port = htons(static_cast<std::uint16_t>(port_));
-    EXPECT_EQ(::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
-    return socket;
-  }
+  FileDescriptor connected() const { return FileDescriptor(connect_to_loopback(port())); }
 
  private:
-  FileDescriptor socket_{::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)};
-  int port_ = 0;
+  FileDescriptor socket_{listen_on_loopback()};
 };
 
 void say(const FileDescriptor& socket, const std::string& bytes) {

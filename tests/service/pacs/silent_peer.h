@@ -1,38 +1,25 @@
 #pragma once
 
-#include <arpa/inet.h>
 #include <gtest/gtest.h>
-#include <sys/socket.h>
 #include <unistd.h>
 
 #include <chrono>
-#include <stdexcept>
 
 #include "algorithms/progress.h"
+#include "tests/support/loopback.h"
 
 namespace volsmooth {
 
 /// Connections to it come about, and then it never says a word.
 class SilentPeer {
  public:
-  SilentPeer() {
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    socklen_t length = sizeof address;
-    auto* const any = reinterpret_cast<sockaddr*>(&address);
-    if (::bind(socket_, any, length) != 0 || ::listen(socket_, 8) != 0 ||
-        ::getsockname(socket_, any, &length) != 0)
-      throw std::runtime_error("no socket to listen with");
-    port_ = ntohs(address.sin_port);
-  }
+  SilentPeer() = default;
   SilentPeer(const SilentPeer&) = delete;
   ~SilentPeer() { ::close(socket_); }
-  int port() const { return port_; }
+  int port() const { return test::port_of(socket_); }
 
  private:
-  const int socket_ = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  int port_ = 0;
+  const int socket_ = test::listen_on_loopback();
 };
 
 /// `send(keep_going)` waits for such a peer. It ends soon after it is told to, by what told it.

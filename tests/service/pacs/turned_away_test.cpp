@@ -1,29 +1,21 @@
 #include "service/pacs/turned_away.h"
 
-#include <arpa/inet.h>
 #include <gtest/gtest.h>
 #include <sys/socket.h>
 
 #include <cerrno>
-#include <stdexcept>
 #include <string>
 #include <utility>
+
+#include "tests/support/loopback.h"
 
 namespace volsmooth {
 namespace {
 
 /// Both ends of a TCP connection: ours, and the peer's.
 std::pair<FileDescriptor, FileDescriptor> connection() {
-  const FileDescriptor listening(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
-  FileDescriptor peer(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t length = sizeof address;
-  auto* const any = reinterpret_cast<sockaddr*>(&address);
-  if (::bind(listening.get(), any, length) != 0 || ::listen(listening.get(), 1) != 0 ||
-      ::getsockname(listening.get(), any, &length) != 0 || ::connect(peer.get(), any, length) != 0)
-    throw std::runtime_error("no connection");
+  const FileDescriptor listening(test::listen_on_loopback());
+  FileDescriptor peer(test::connect_to_loopback(test::port_of(listening.get())));
   return {FileDescriptor(::accept(listening.get(), nullptr, nullptr)), std::move(peer)};
 }
 
