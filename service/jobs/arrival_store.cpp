@@ -6,10 +6,8 @@
 namespace volsmooth {
 namespace {
 
-std::vector<std::string> texts_of(Statement row) {
-  std::vector<std::string> texts;
-  while (row.step()) texts.push_back(row.text(0));
-  return texts;
+std::vector<std::string> texts_of(Statement rows) {
+  return all_of(std::move(rows), [](const Statement& row) { return row.text(0); });
 }
 
 }  // namespace
@@ -41,13 +39,14 @@ std::optional<DicomSource> ArrivalStore::quiet_since(const std::string& preset, 
 
 std::vector<ArrivedPart> ArrivalStore::parts_of(std::string_view job_id) {
   return database_.read([&](Database& database) {
-    Statement row = database.query(
-        "SELECT file, offset, bytes FROM arrivals WHERE job = (SELECT sequence FROM jobs WHERE id = ?) "
-        "ORDER BY sequence",
-        job_id);
-    std::vector<ArrivedPart> parts;
-    while (row.step()) parts.push_back({row.text(0), row.integer(1), row.integer(2)});
-    return parts;
+    return all_of(
+        database.query(
+            "SELECT file, offset, bytes FROM arrivals WHERE job = (SELECT sequence FROM jobs WHERE id = ?) "
+            "ORDER BY sequence",
+            job_id),
+        [](const Statement& row) {
+          return ArrivedPart{row.text(0), row.integer(1), row.integer(2)};
+        });
   });
 }
 

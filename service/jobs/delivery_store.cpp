@@ -54,13 +54,14 @@ void DeliveryStore::expect(std::string_view job_id, std::span<const DicomInstanc
 
 std::vector<LedgerEntry> DeliveryStore::ledger(std::string_view job_id) {
   return database_.read([&](Database& database) {
-    Statement row = database.query(
-        "SELECT sop_class_uid, sop_instance_uid, result, state, reason FROM delivered_instances "
-        "WHERE job = (SELECT sequence FROM jobs WHERE id = ?) ORDER BY result, rowid",
-        job_id);
-    std::vector<LedgerEntry> entries;
-    while (row.step()) entries.push_back({{row.text(0), row.text(1), row.text(2)}, row.text(3), row.text(4)});
-    return entries;
+    return all_of(
+        database.query(
+            "SELECT sop_class_uid, sop_instance_uid, result, state, reason FROM delivered_instances "
+            "WHERE job = (SELECT sequence FROM jobs WHERE id = ?) ORDER BY result, rowid",
+            job_id),
+        [](const Statement& row) {
+          return LedgerEntry{{row.text(0), row.text(1), row.text(2)}, row.text(3), row.text(4)};
+        });
   });
 }
 

@@ -37,13 +37,11 @@ Result result_from(const Statement& row) {
 }
 
 std::vector<Result> results_of(Database& database, std::int64_t sequence) {
-  Statement row = database.query(
-      "SELECT name, kind, method, isovalues, many_surfaces, frame, media_type, bytes, sha256 FROM results "
-      "WHERE job = ? ORDER BY position",
-      sequence);
-  std::vector<Result> results;
-  while (row.step()) results.push_back(result_from(row));
-  return results;
+  return all_of(
+      database.query("SELECT name, kind, method, isovalues, many_surfaces, frame, media_type, bytes, sha256 "
+                     "FROM results WHERE job = ? ORDER BY position",
+                     sequence),
+      result_from);
 }
 
 JobStore::Listed job_from(Database& database, const Statement& row) {
@@ -151,14 +149,12 @@ std::vector<JobStore::Listed> JobStore::list(const JobQuery& query, std::optiona
     std::optional<std::string_view> state;
     if (query.state) state = name_of(*query.state);
     // A condition whose value is absent holds for every row.
-    Statement row = database.query(
+    Statement rows = database.query(
         std::string(kSelectJob) +
             "WHERE (?1 IS NULL OR state = ?1) AND (?2 = '' OR method = ?2) AND (?3 = '' OR label = ?3) "
             "AND (?4 IS NULL OR sequence < ?4) ORDER BY sequence DESC LIMIT ?5",
         state, query.method, query.label, before, query.limit + 1);
-    std::vector<Listed> jobs;
-    while (row.step()) jobs.push_back(job_from(database, row));
-    return jobs;
+    return all_of(std::move(rows), [&](const Statement& row) { return job_from(database, row); });
   });
 }
 
@@ -257,11 +253,11 @@ std::optional<JobStore::Removal> JobStore::remove(std::string_view id,
 
 std::vector<JobStore::Interrupted> JobStore::running() {
   return database_.read([](Database& database) {
-    Statement row = database.query(std::string(kSelectJob) + "WHERE state = 'running' ORDER BY sequence");
-    std::vector<Interrupted> jobs;
-    while (row.step())
-      jobs.push_back({job_from(database, row).job, static_cast<int>(row.integer(13)), row.integer(14) != 0});
-    return jobs;
+    return all_of(database.query(std::string(kSelectJob) + "WHERE state = 'running' ORDER BY sequence"),
+                  [&](const Statement& row) {
+                    return Interrupted{job_from(database, row).job, static_cast<int>(row.integer(13)),
+                                       row.integer(14) != 0};
+                  });
   });
 }
 
@@ -276,13 +272,14 @@ std::set<std::string, std::less<>> JobStore::results_directories() {
 
 std::vector<NumberedEvent> JobStore::events_after(std::string_view id, EventNumber after) {
   return database_.read([&](Database& database) {
-    Statement row = database.query(
-        "SELECT start, number, kind, data FROM events WHERE job = (SELECT sequence FROM jobs WHERE id = ?1) "
-        "AND (start, number) > (?2, ?3) ORDER BY start, number",
-        id, after.start, after.number);
-    std::vector<NumberedEvent> events;
-    while (row.step()) events.push_back({{row.integer(0), row.integer(1)}, row.text(2), row.text(3)});
-    return events;
+    return all_of(
+        database.query("SELECT start, number, kind, data FROM events "
+                       "WHERE job = (SELECT sequence FROM jobs WHERE id = ?1) AND (start, number) > (?2, ?3) "
+                       "ORDER BY start, number",
+                       id, after.start, after.number),
+        [](const Statement& row) {
+          return NumberedEvent{{row.integer(0), row.integer(1)}, row.text(2), row.text(3)};
+        });
   });
 }
 

@@ -37,11 +37,10 @@ std::optional<StoredVolume> VolumeStore::find(std::string_view id) {
 
 std::vector<StoredVolume> VolumeStore::all() {
   return database_.read([](Database& database) {
-    Statement row = database.query(
-        "SELECT id, options, facts, bytes, sha256, created_ms FROM volumes ORDER BY sequence DESC");
-    std::vector<StoredVolume> volumes;
-    while (row.step()) volumes.push_back(volume_from(row));
-    return volumes;
+    return all_of(
+        database.query(
+            "SELECT id, options, facts, bytes, sha256, created_ms FROM volumes ORDER BY sequence DESC"),
+        volume_from);
   });
 }
 

@@ -10,6 +10,9 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <type_traits>
+#include <utility>
+#include <vector>
 
 struct sqlite3;
 struct sqlite3_stmt;
@@ -59,6 +62,14 @@ class Statement {
   std::unique_ptr<sqlite3_stmt, Finalize> statement_;
   int bound_ = 0;
 };
+
+/// What `make` makes of each of the rows that are left.
+template <class Make>
+auto all_of(Statement row, const Make& make) {
+  std::vector<std::invoke_result_t<const Make&, const Statement&>> made;
+  while (row.step()) made.push_back(make(std::as_const(row)));
+  return made;
+}
 
 /// One connection to a SQLite file in WAL mode; used by one thread at a time. Keep to one writer for a file
 /// and let it outlive the readers: only a writer checkpoints (SQLite before 3.51.3 can corrupt the file when
