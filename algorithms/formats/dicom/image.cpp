@@ -7,6 +7,7 @@
 
 #include "algorithms/formats/dicom/attributes.h"
 #include "algorithms/formats/dicom/geometry.h"
+#include "algorithms/formats/dicom/identifiers.h"
 #include "algorithms/formats/dicom/pixel_ranges.h"
 #include "algorithms/formats/dicom/refused.h"
 #include "algorithms/formats/nifti_limits.h"
@@ -15,13 +16,9 @@ namespace volsmooth {
 namespace {
 
 constexpr Attribute kImageType{{0x0008, 0x0008}, "CS", "ImageType"};
-constexpr Attribute kSopClass{{0x0008, 0x0016}, "UI", "SOPClassUID"};
-constexpr Attribute kSopInstance{{0x0008, 0x0018}, "UI", "SOPInstanceUID"};
 constexpr Attribute kModality{{0x0008, 0x0060}, "CS", "Modality"};
 constexpr Attribute kPatientName{{0x0010, 0x0010}, "PN", "PatientName"};
 constexpr Attribute kPatientId{{0x0010, 0x0020}, "LO", "PatientID"};
-constexpr Attribute kStudy{{0x0020, 0x000d}, "UI", "StudyInstanceUID"};
-constexpr Attribute kSeries{{0x0020, 0x000e}, "UI", "SeriesInstanceUID"};
 constexpr Attribute kPosition{{0x0020, 0x0032}, "DS", "ImagePositionPatient"};
 constexpr Attribute kOrientation{{0x0020, 0x0037}, "DS", "ImageOrientationPatient"};
 constexpr Attribute kFrameOfReference{{0x0020, 0x0052}, "UI", "FrameOfReferenceUID"};

@@ -3,18 +3,13 @@
 #include <algorithm>
 #include <string_view>
 
-#include "algorithms/formats/dicom/attributes.h"
+#include "algorithms/formats/dicom/identifiers.h"
 #include "algorithms/formats/dicom/refused.h"
 #include "algorithms/formats/dicom/uploaded_files.h"
 #include "algorithms/formats/dicom_upload.h"
 
 namespace volsmooth {
 namespace {
-
-constexpr Attribute kSopClass{{0x0008, 0x0016}, "UI", "SOPClassUID"};
-constexpr Attribute kSopInstance{{0x0008, 0x0018}, "UI", "SOPInstanceUID"};
-constexpr Attribute kStudy{{0x0020, 0x000d}, "UI", "StudyInstanceUID"};
-constexpr Attribute kSeries{{0x0020, 0x000e}, "UI", "SeriesInstanceUID"};
 
 std::string uid_of(const Attributes& attributes, const Attribute& attribute) {
   constexpr std::size_t kLongestUid = 64;  // PS3.5, 6.2
