@@ -51,9 +51,8 @@ JobService::State::State(JobServiceSettings given, Engine computing, Pacs networ
       delivery_runner(pacs, files, database, jobs, settings,
                       [this](const std::string& id) { wakes.wake(id); }),
       pool(settings.workers, [this] { return claim(JobStore::Work::kCompute); }),
-      retrievals(pacs.nodes.empty() && pacs.presets.empty() ? 0 : kExchanges,
-                 [this] { return claim(JobStore::Work::kRetrieve); }),
-      delivering(pacs.nodes.empty() ? 0 : kExchanges, [this] { return delivery_runner.claim(); }),
+      retrievals(kExchanges, [this] { return claim(JobStore::Work::kRetrieve); }),
+      delivering(kExchanges, [this] { return delivery_runner.claim(); }),
       receiving(pacs.presets.empty() ? 0 : 1, [this] { return claim_arrivals(); }) {
   check_presets();
   recover();

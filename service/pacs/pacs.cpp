@@ -11,20 +11,32 @@
 
 namespace volsmooth {
 
+namespace {
+
+/// A job that was accepted under another configuration may name a node that is not there any more, or that is
+/// a DIMSE peer now.
+NodeFailure gone(const std::string& node) {
+  return {{"node-unreachable",
+           "The configuration has no node '" + node + "' any more that can do this.",
+           {{"node", node}}},
+          false};
+}
+
+}  // namespace
+
 Pacs make_pacs(std::vector<Node> nodes, std::vector<Preset> presets, std::int64_t max_bytes) {
   if (std::ranges::any_of(nodes, [](const Node& node) { return node.dimse.has_value(); })) dimse_program();
   Pacs pacs;
   pacs.presets = std::move(presets);
   for (const Node& node : nodes) pacs.nodes.push_back({node.name, !node.dimse});
-  // A job that was accepted under another configuration may name a node that is not there any more.
   const auto find = [nodes = std::move(nodes)](const std::string& name) -> tl::expected<Node, NodeFailure> {
     const auto found = std::ranges::find(nodes, name, &Node::name);
     if (found != nodes.end()) return *found;
-    return tl::unexpected(NodeFailure{
-        {"node-unreachable", "The configuration has no such node any more.", {{"node", name}}}, true});
+    return tl::unexpected(gone(name));
   };
   pacs.retrieve = [find, max_bytes](const DicomSource& source, IncomingFile& file, const Progress& report) {
-    return find(source.node).and_then([&](const Node& node) {
+    return find(source.node).and_then([&](const Node& node) -> tl::expected<void, NodeFailure> {
+      if (node.dimse) return tl::unexpected(gone(node.name));
       return retrieve_series(node, source, file, max_bytes, report);
     });
   };

@@ -82,7 +82,7 @@ class PacsJobs : public JobServiceTest {
     JobServiceSettings given = settings();
     given.longest_node_pause = 20ms;
     given.node_patience = patience_;
-    service_ = std::make_unique<JobService>(given, engine, node_.pacs());
+    service_ = std::make_unique<JobService>(given, engine, pacs_ ? *pacs_ : node_.pacs());
     service_->start();
   }
 
@@ -108,6 +108,7 @@ class PacsJobs : public JobServiceTest {
   }
 
   FakeNode node_;
+  std::optional<Pacs> pacs_;  ///< in place of the node's
   std::chrono::milliseconds patience_ = 1h;
   std::string seen_volume_;
 };
@@ -173,6 +174,25 @@ TEST_F(PacsJobs, PatienceEnds) {
   const Job failed = wait_for(*service_, service_->submit(source_order()).value().id);
   EXPECT_EQ(failed.state, JobState::kFailed);
   EXPECT_EQ(failed.error->slug, "node-unreachable");
+}
+
+/// Also when no node and no preset is left, so that nothing would have to be exchanged with anybody.
+TEST_F(PacsJobs, WhatNamesANodeThatTheConfigurationLostFails) {
+  node_.up = false;
+  open();
+  const std::string waiting = service_->submit(source_order()).value().id;
+  const std::string undelivered = service_->submit(delivery_order()).value().id;
+  wait_for(*service_, undelivered);
+  service_.reset();
+
+  const auto gone = [] { return tl::unexpected(NodeFailure{{"node-unreachable", "It is gone."}, false}); };
+  pacs_ = node_.pacs();
+  pacs_->nodes.clear();
+  pacs_->retrieve = [=](auto&&...) { return gone(); };
+  pacs_->send = [=](auto&&...) { return gone(); };
+  open();
+  EXPECT_EQ(wait_for(*service_, waiting).error->detail, "It is gone.");
+  EXPECT_EQ(delivered(undelivered, DeliveryState::kFailed).delivery->error->detail, "It is gone.");
 }
 
 TEST_F(PacsJobs, AMissingSeriesIsNotAskedForAgain) {
