@@ -165,7 +165,8 @@ class JobRun {
     const auto file = new_result(method + "_dicom.zip", "series", method, "application/zip");
     results_.back().frame = name_of(Frame::kLps);
     const std::int64_t clipped = dicom_.write_series(file, volume, progress);
-    if (clipped > 0 && !wanted("nifti")) warn_of_clipped(clipped, method);
+    const bool said = wanted("nifti") && task_.order.voxel_type != "float32";
+    if (clipped > 0 && !said) warn_of_clipped(clipped, method);
   }
 
   void write_dicom_surfaces(const std::string& method, const std::vector<Mesh>& surfaces) {

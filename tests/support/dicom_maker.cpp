@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <limits>
 #include <set>
 
 #include "tests/support/zip_maker.h"
@@ -236,6 +237,42 @@ std::vector<DicomDataset> series_of(const SeriesPhantom& phantom) {
     set.numbers(0x00281053, {phantom.slope});
     set.words(0x7fe00010, stored_slice(phantom, slice));
     series.push_back(std::move(set));
+  }
+  return series;
+}
+
+std::vector<DicomDataset> pet_series_of(const SeriesPhantom& phantom) {
+  auto series = series_of(phantom);
+  for (std::int64_t slice = 0; slice < phantom.slices; ++slice) {
+    double largest = 1;
+    for (std::int64_t row = 0; row < phantom.rows; ++row)
+      for (std::int64_t column = 0; column < phantom.columns; ++column)
+        largest = std::max(largest, phantom.intensity(position_of(phantom, column, row, slice)));
+    SeriesPhantom scaled = phantom;
+    scaled.slope = largest / std::numeric_limits<std::int16_t>::max();
+    scaled.intercept = 0;
+    DicomDataset& set = series[static_cast<std::size_t>(slice)];
+    set.words(0x7fe00010, stored_slice(scaled, slice));
+    set.numbers(0x00281052, {0});
+    set.numbers(0x00281053, {scaled.slope});
+    set.text(0x00080016, "UI", "1.2.840.10008.5.1.4.1.1.128");
+    set.text(0x00080060, "CS", "PT");
+    set.text(0x00080008, "CS", "ORIGINAL\\PRIMARY");
+    set.text(0x00080021, "DA", "20200102");
+    set.text(0x00080031, "TM", "101500");
+    set.text(0x00080022, "DA", "20200102");
+    set.text(0x00080032, "TM", "101500");
+    set.text(0x00180050, "DS", "1");
+    set.text(0x00181242, "IS", "300000");
+    set.text(0x00280051, "CS", "DECY\\ATTN");
+    set.text(0x00541000, "CS", "STATIC\\IMAGE");
+    set.text(0x00541001, "CS", "BQML");
+    set.text(0x00541002, "CS", "EMISSION");
+    set.text(0x00541102, "CS", "START");
+    set.text(0x00541300, "DS", "0");
+    set.text(0x00541321, "DS", "1");
+    set.us(0x00540081, static_cast<std::uint16_t>(phantom.slices));
+    set.us(0x00541330, static_cast<std::uint16_t>(slice + 1));
   }
   return series;
 }

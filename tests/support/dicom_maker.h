@@ -62,6 +62,10 @@ Point position_of(const SeriesPhantom& phantom, std::int64_t column, std::int64_
 
 /// Slice by slice; an instance number says their order backwards, and the patient is called PLANTED^NAME.
 std::vector<DicomDataset> series_of(const SeriesPhantom& phantom);
+/// The same field as activity (Bq/ml, 1 at the least) in a PET series, each slice with the slope that makes
+/// the most of its 16 bits, as scanners write it. The phantom's slope and intercept do not count.
+std::vector<DicomDataset> pet_series_of(const SeriesPhantom& phantom);
+
 std::vector<std::string> files_of(const std::vector<DicomDataset>& datasets,
                                   const std::string& transfer_syntax = transfer_syntax::kExplicit);
 

@@ -5,6 +5,7 @@
 
 #include "tests/support/bad_dicom.h"
 #include "tests/support/dicom_maker.h"
+#include "tests/support/dicom_results.h"
 #include "tests/system/client_run.h"
 #include "tests/system/nifti_bytes.h"
 #include "tests/system/service_client.h"
@@ -15,6 +16,7 @@ namespace {
 
 constexpr double kRadius = 12, kFlowTime = 1;
 constexpr Point kCentre{3, -5, 40};
+constexpr double kRounding = 2e-3;  ///< of floats up to 2^14
 
 double distance_from_centre(const Point& p) {
   return std::hypot(p[0] - kCentre[0], p[1] - kCentre[1], p[2] - kCentre[2]);
@@ -135,6 +137,48 @@ TEST(Dicom, NiftiOutputLiesInRasWithItsPaddingBack) {
     std::memcpy(&before, series[slice][0x7fe00010].bytes.data() + 2 * (8 * 16 + 8), 2);
     EXPECT_NEAR(stored(middle), before, 1) << slice;
   }
+}
+
+/// A hot ball in a warm background, which grows warmer from slice to slice.
+SeriesPhantom hot_ball() {
+  SeriesPhantom phantom{.columns = 24, .rows = 20, .slices = 12, .slice_step_mm = {0, 0, 2}};
+  phantom.origin_mm = {-12, -10, -11};
+  phantom.intensity = [](const Point& p) {
+    return 3000 + 60 * p[2] + 9000 * (1 - std::tanh((std::hypot(p[0], p[1], p[2]) - 7) / 2));
+  };
+  return phantom;
+}
+
+/// Both results hold the same smoothed volume: as float, and in 16 bits by the slope of each slice.
+TEST(Dicom, PetComesBackByTheSlopeOfEachSlice) {
+  const Daemon daemon(VOLSMOOTHD);
+  const ServiceClient service(daemon);
+  const auto source = read_into_memory(zip_of(files_of(pet_series_of(hot_ball()))));
+  const json volume = service.upload(source.upload);
+  const json job = service.run({{"volume", volume.at("id")},
+                                {"parameters", {{"flow_time_mm2", 4}}},
+                                {"isovalues", json::array()},
+                                {"outputs", {"nifti", "dicom-series"}}});
+  const auto derived = read_into_memory(service.fetch(job.at("id"), "mean-curvature-flow_dicom.zip"));
+  const Bytes nifti = gunzip(service.fetch(job.at("id"), "mean-curvature-flow.nii.gz"));
+  ASSERT_EQ(read_at<std::int16_t>(nifti, nifti1::kDatatype), kDatatypeCode<float>);
+
+  ASSERT_EQ(derived.voxels.size(), source.voxels.size());
+  const auto& slices = derived.series.slices;
+  const std::size_t plane = derived.voxels.size() / slices.size();
+  double moved = 0;
+  for (std::size_t k = 0; k < slices.size(); ++k) {
+    EXPECT_EQ(slices[k].sop_class_uid, "1.2.840.10008.5.1.4.1.1.128");
+    EXPECT_EQ(slices[k].position_mm, source.series.slices[k].position_mm);
+    EXPECT_GE(slices[k].rescale_slope, source.series.slices[k].rescale_slope);
+    for (std::size_t i = k * plane; i < (k + 1) * plane; ++i) {
+      const float smoothed = read_at<float>(nifti, nifti1::kData + 4 * i);
+      ASSERT_NEAR(derived.voxels[i], smoothed, slices[k].rescale_slope / 2 + kRounding) << i;
+      moved = std::max(moved, std::abs(double{smoothed} - double{source.voxels[i]}));
+    }
+  }
+  EXPECT_GT(moved, 1000) << "smoothed";
+  EXPECT_GT(slices.back().rescale_slope, 1.1 * slices.front().rescale_slope);
 }
 
 TEST(Dicom, SeveralSeriesAreListed) {

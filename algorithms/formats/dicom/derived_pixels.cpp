@@ -137,6 +137,17 @@ std::span<const float> plane_at_slice(const DicomSeries& series, std::span<const
   return mixed;
 }
 
+double fitting_slope(std::span<const float> intensities, const DicomSlice& slice, const PixelFormat& format) {
+  const Range range = range_of(format);
+  const auto [least, largest] = std::ranges::minmax(intensities);
+  double slope = slice.rescale_slope;
+  for (const auto& [intensity, end] : {std::pair{least, range.lowest}, {largest, range.highest}})
+    if (slope > 0 && end != 0)
+      slope = std::max(slope,
+                       (static_cast<double>(intensity) - slice.rescale_intercept) / static_cast<double>(end));
+  return slope;
+}
+
 std::int64_t append_stored(std::span<const float> intensities, const DicomSlice& slice,
                            const PixelFormat& format, std::span<const std::int32_t> original,
                            std::vector<std::byte>& into) {

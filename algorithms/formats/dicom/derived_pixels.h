@@ -14,6 +14,9 @@ namespace volsmooth {
 std::span<const float> plane_at_slice(const DicomSeries& series, std::span<const float> intensities,
                                       std::size_t which, std::vector<float>& mixed);
 
+/// The slope of a slice, or the least one by which its stored values can hold these intensities.
+double fitting_slope(std::span<const float> intensities, const DicomSlice& slice, const PixelFormat& format);
+
 /// Stored values of a slice, little-endian, behind `into`. `original`: the stored values that a slice with a
 /// padding value had, of which those that are padding are written again. The number of clipped voxels beside
 /// those.

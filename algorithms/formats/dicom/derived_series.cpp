@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <cstdlib>
 #include <map>
 
 #include "algorithms/formats/dicom/derived_attributes.h"
@@ -14,7 +15,7 @@
 namespace volsmooth {
 namespace {
 
-constexpr std::uint32_t kInstanceNumber = 0x00200013, kPixels = 0x7fe00010;
+constexpr std::uint32_t kInstanceNumber = 0x00200013, kSlope = 0x00281053, kPixels = 0x7fe00010;
 constexpr std::size_t kLongestPixels = 0xfffffffe;
 
 /// A file with its pixels.
@@ -34,6 +35,10 @@ class SeriesWriter {
       if (is_new) slices_.emplace_back();
       slices_[place->second].push_back(which);
     }
+    own_slopes_ = slices_.size() == series_.slices.size() &&
+                  std::ranges::any_of(series_.slices, [&](const DicomSlice& slice) {
+                    return slice.rescale_slope != series_.slices.front().rescale_slope;
+                  });
     UidSource uids(derivation.instance_seed);
     for (std::vector<std::size_t>& slices : slices_) {
       std::ranges::sort(slices, {}, [this](std::size_t which) { return series_.slices[which].frame; });
@@ -62,10 +67,19 @@ class SeriesWriter {
     gdcm::DataSet set =
         derived_attributes(public_attributes(source->bytes), series_, first, derivation_, uids_[which]);
     set_text(set, kInstanceNumber, gdcm::VR::IS, std::to_string(which + 1));
-    std::vector<std::byte> bytes = part10_file(set);
-    begin_pixels(bytes, slices_[which].size());
     WrittenFile written;
-    for (const std::size_t slice : slices_[which]) written.clipped_voxels += append_slice(slice, bytes);
+    std::vector<std::byte> bytes;
+    std::vector<float> mixed;
+    for (const std::size_t index : slices_[which]) {
+      DicomSlice slice = series_.slices[index];
+      const auto plane = plane_at_slice(series_, intensities_, index, mixed);
+      if (own_slopes_) fit_slope(slice, plane, set);
+      if (bytes.empty()) {
+        bytes = part10_file(set);
+        begin_pixels(bytes, slices_[which].size());
+      }
+      written.clipped_voxels += append_slice(slice, plane, bytes);
+    }
     if (bytes.size() % 2 == 1) bytes.push_back(std::byte{0});
     std::array<char, 32> name{};
     std::snprintf(name.data(), name.size(), "%04zu.dcm", which + 1);
@@ -86,16 +100,25 @@ class SeriesWriter {
     file.reserve(file.size() + length + 1);
   }
 
-  std::int64_t append_slice(std::size_t which, std::vector<std::byte>& file) const {
-    const DicomSlice& slice = series_.slices[which];
+  /// Of PET, a slice's slope may be just what its own values needed; smoothed, it may hold larger ones.
+  void fit_slope(DicomSlice& slice, std::span<const float> plane, gdcm::DataSet& set) const {
+    const double needed = fitting_slope(plane, slice, series_.format);
+    if (needed == slice.rescale_slope) return;
+    std::array<char, 17> text{};      // the longest decimal string
+    constexpr double kUp = 1 + 1e-8;  // of the last digit
+    std::snprintf(text.data(), text.size(), "%.9e", needed * kUp);
+    set_text(set, kSlope, gdcm::VR::DS, text.data());
+    slice.rescale_slope = std::atof(text.data());
+  }
+
+  std::int64_t append_slice(const DicomSlice& slice, std::span<const float> plane,
+                            std::vector<std::byte>& file) const {
     std::vector<std::int32_t> original;
     if (slice.padding) {
       auto decoded = decode_slice(series_, slice);
       if (!decoded) throw Refused{decoded.error()};
       original = *std::move(decoded);
     }
-    std::vector<float> mixed;
-    const auto plane = plane_at_slice(series_, intensities_, which, mixed);
     return append_stored(plane, slice, series_.format, original, file);
   }
 
@@ -105,6 +128,7 @@ class SeriesWriter {
   const TakeFile& take_;
   std::vector<std::vector<std::size_t>> slices_;  ///< of each file, files along the slices
   std::vector<std::string> uids_;                 ///< of each file
+  bool own_slopes_ = false;                       ///< each file is a slice with its own
 };
 
 }  // namespace

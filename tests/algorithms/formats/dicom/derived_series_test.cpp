@@ -43,35 +43,10 @@ std::vector<DicomDataset> magnetic(const SeriesPhantom& phantom) {
   return series;
 }
 
-/// A PET series of activity in Bq/ml, each slice with the slope that makes the most of its 16 bits, as
-/// scanners write it.
 std::vector<DicomDataset> positrons() {
-  SeriesPhantom phantom{.columns = 12, .rows = 10, .slices = 7, .slope = 0.5, .intercept = 0};
-  phantom.intensity = [](const Point& p) { return 4000 + 30 * p[0] + 20 * p[1]; };
-  auto series = test::series_of(phantom);
-  for (std::size_t slice = 0; slice < series.size(); ++slice) {
-    DicomDataset& set = series[slice];
-    set.text(0x00080016, "UI", "1.2.840.10008.5.1.4.1.1.128");
-    set.text(0x00080060, "CS", "PT");
-    set.text(0x00080008, "CS", "ORIGINAL\\PRIMARY");
-    set.text(0x00080021, "DA", "20200102");
-    set.text(0x00080031, "TM", "101500");
-    set.text(0x00080022, "DA", "20200102");
-    set.text(0x00080032, "TM", "101500");
-    set.text(0x00180050, "DS", "1");
-    set.text(0x00181242, "IS", "300000");
-    set.numbers(0x00281053, {0.25 + 0.05 * static_cast<double>(slice)});
-    set.text(0x00280051, "CS", "DECY\\ATTN");
-    set.text(0x00541000, "CS", "STATIC\\IMAGE");
-    set.text(0x00541001, "CS", "BQML");
-    set.text(0x00541002, "CS", "EMISSION");
-    set.text(0x00541102, "CS", "START");
-    set.text(0x00541300, "DS", "0");
-    set.text(0x00541321, "DS", "1");
-    set.us(0x00540081, static_cast<std::uint16_t>(series.size()));
-    set.us(0x00541330, static_cast<std::uint16_t>(slice + 1));
-  }
-  return series;
+  SeriesPhantom phantom{.columns = 12, .rows = 10, .slices = 7};
+  phantom.intensity = [](const Point& p) { return 4000 + 30 * p[0] + 20 * p[1] + 500 * p[2]; };
+  return test::pet_series_of(phantom);
 }
 
 std::vector<float> plus(std::vector<float> voxels, float shift) {
@@ -300,7 +275,7 @@ TEST(DerivedSeries, OfPetHasEachSlicesOwnRescale) {
   const SeriesInMemory source = read(positrons());
   EXPECT_EQ(source.facts.voxel_type, "float32");
   EXPECT_THAT(source.facts.warnings, testing::Contains(testing::StartsWith("rescaled-by-slice")));
-  const auto derived = test::derive(source, plus(source.voxels, 1000));
+  const auto derived = test::derive(source, plus(source.voxels, -1000));
   const auto& slices = derived.again.series.slices;
   ASSERT_EQ(slices.size(), source.series.slices.size());
   EXPECT_EQ(derived.again.series.format, source.series.format);
@@ -310,12 +285,27 @@ TEST(DerivedSeries, OfPetHasEachSlicesOwnRescale) {
     EXPECT_EQ(slices[k].rescale_intercept, 0);
     EXPECT_EQ(slices[k].sop_class_uid, "1.2.840.10008.5.1.4.1.1.128");
     for (std::size_t i = k * plane; i < (k + 1) * plane; ++i)
-      ASSERT_NEAR(derived.again.voxels[i], source.voxels[i] + 1000, slices[k].rescale_slope / 2 + 1e-3);
+      ASSERT_NEAR(derived.again.voxels[i], source.voxels[i] - 1000, slices[k].rescale_slope / 2 + 1e-3);
   }
   EXPECT_NE(slices[0].rescale_slope, slices[1].rescale_slope);
   const gdcm::DataSet set = derived.attributes(3);
   EXPECT_EQ(text_of(set, 0x00541001), "BQML");
   EXPECT_EQ(text_of(set, 0x00080060), "PT");
+}
+
+/// Not by a hair more than it takes, and none where it takes none.
+TEST(DerivedSeries, OfPetGetsALargerSlopeWhereASliceGrewHotter) {
+  const SeriesInMemory source = read(positrons());
+  std::vector<float> hotter = source.voxels;
+  const std::size_t plane = hotter.size() / 7;
+  hotter[plane] = 9000;
+  const auto derived = test::derive(source, hotter);
+  EXPECT_EQ(derived.counts.clipped_voxels, 0);
+  const auto& slices = derived.again.series.slices;
+  EXPECT_EQ(slices[0].rescale_slope, source.series.slices[0].rescale_slope);
+  EXPECT_NEAR(slices[1].rescale_slope, 9000.0 / 32767, 1e-7);
+  for (std::size_t i = 0; i < hotter.size(); ++i)
+    ASSERT_NEAR(derived.again.voxels[i], hotter[i], slices[i / plane].rescale_slope / 2 + 1e-3) << i;
 }
 
 /// GDCM stops reading at an element that is out of order; the patient stands behind this one.
