@@ -10,7 +10,6 @@
 #include "service/pacs/sending.h"
 
 namespace volsmooth {
-
 namespace {
 
 /// A job that was accepted under another configuration may name a node that is not there any more, or that is

@@ -181,6 +181,22 @@ TEST_F(Loop, RunsThePresetOnWhatADeviceSends) {
   EXPECT_EQ(client().get("/v1/jobs").at("jobs").size(), 1u);
 }
 
+/// The README's commands, as a stranger would type them: its archive is this one.
+TEST_F(Loop, TheCommandsOfTheReadmeBringASeriesBack) {
+  const auto credentials = folder_ / "credentials";
+  std::ofstream(credentials) << "user:password";
+  std::filesystem::permissions(credentials, std::filesystem::perms::owner_read);
+  const std::string places = "s|https://pacs.example/dicom-web|" + archive_->address() +
+                             "|;s|/etc/volsmooth/archive|" + credentials.string() + "|;s|\"1.2.3\"|\"" +
+                             study_ + "\"|;s|\"1.2.3.4\"|\"" + series_ + "\"|";
+  ChildProcess readme({README_TEST, README, BUILD, "tested beside an archive", places}, folder_ / "said",
+                      folder_ / "said");
+  EXPECT_EQ(readme.wait(), 0) << content_of(folder_ / "said");
+  const auto derived = derived_series_in(*archive_, study_);
+  ASSERT_EQ(derived.size(), 1u);
+  EXPECT_EQ(derived.begin()->second, std::ssize(datasets_));
+}
+
 TEST_F(Loop, RefusesWhatIsNoDicomAndUnknownNames) {
   const HeaderFields type{{"Content-Type", "application/octet-stream"}};
   EXPECT_EQ(client().call("POST", "/dicomweb/head/studies", "no DICOM", type).status, 422);
