@@ -32,6 +32,8 @@ compressed() {
 
 compressed rle dcmcrle
 compressed jpeg_lossless dcmcjpeg +e1
+# A version of JFIF that there is not, of which GDCM's decoder asserts that it does not occur.
+LC_ALL=C sed 's/JFIF\x00\x01/JFIF\x00\xfa/' "$corpus/dicom/series_jpeg_lossless" >"$corpus/dicom/series_jpeg_jfif_250"
 compressed jpeg_ls dcmcjpls
 compressed jpeg_2000 gdcmconv --j2k -n 1
 rm -r "$slices"

@@ -53,6 +53,9 @@ void write_dicom(const fs::path& folder) {
     slice[0x7fe00010].bytes.replace(0, 4, "\x30\xf8\x30\xf8");
   }
   write(folder / "padded", multipart_of(files_of(padded)));
+  SeriesPhantom warm = small();
+  warm.intensity = [](const Point& p) { return 500 + 20 * p[0] + 100 * p[2]; };
+  write(folder / "pet", multipart_of(files_of(pet_series_of(warm))));
   const auto files = files_of(series_of({.slices = 2}));  // less than 16 x 16 no encoder of JPEG 2000 takes
   for (std::size_t which = 0; which < files.size(); ++which)  // for make_corpus.sh to compress
     write(folder / "slices" / ("slice" + std::to_string(which)), files[which]);
