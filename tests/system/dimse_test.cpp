@@ -327,12 +327,11 @@ TEST_F(Dimse, AnAssociationThatIsKilledEndsAlone) {
   const RawPeer peer(port_);
   peer.say(association_request());
   ASSERT_GT(child(), 0);
-  EXPECT_THAT(content_of("/proc/" + std::to_string(child()) + "/comm"),
-              testing::HasSubstr("volsmooth-dimse"));
-  EXPECT_TRUE(eventually([&] {
-    return content_of("/proc/" + std::to_string(child()) + "/status").find("Seccomp:\t2") !=
-           std::string::npos;
-  }));
+  const auto told = [&](const std::string& file) {
+    return content_of("/proc/" + std::to_string(child()) + "/" + file);
+  };
+  EXPECT_TRUE(eventually([&] { return told("comm").find("volsmooth-dimse") != std::string::npos; }));
+  EXPECT_TRUE(eventually([&] { return told("status").find("Seccomp:\t2") != std::string::npos; }));
   EXPECT_EQ(kill(child(), SIGKILL), 0);
   peer.hear();
   EXPECT_EQ(store(port_, "HEAD", {files_.front()}), 0);
