@@ -41,7 +41,8 @@ build() {
   export CCACHE_NOHASHDIR=1 CCACHE_BASEDIR=$PWD CCACHE_SLOPPINESS=pch_defines,time_macros
   say "building in $directory (the first time takes minutes)"
   local log
-  log=$(cmake -S . -B "$directory" -G Ninja "${options[@]}" 2>&1) ||
+  # In a unity build the headers are compiled once for eight sources: half the time.
+  log=$(cmake -S . -B "$directory" -G Ninja -DCMAKE_UNITY_BUILD=ON "${options[@]}" 2>&1) ||
     { printf '%s\n' "$log" >&2; die "configuring failed; the lines above say why"; }
   cmake --build "$directory" ${@:+--target "$@"} >&2 || die "building failed; the lines above say why"
 }

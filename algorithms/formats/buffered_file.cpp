@@ -3,27 +3,23 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-#include <cerrno>
 #include <charconv>
 #include <cstring>
-#include <system_error>
 #include <utility>
+
+#include "algorithms/formats/throw_errno.h"
 
 namespace volsmooth {
 namespace {
 
 constexpr std::size_t kBufferSize = std::size_t{1} << 18;
 
-[[noreturn]] void fail(const char* what) {
-  throw std::system_error(errno, std::generic_category(), what);
-}
-
 }  // namespace
 
 BufferedFile::BufferedFile(const std::filesystem::path& file)
     : descriptor_(::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666)),
       buffer_(kBufferSize) {
-  if (descriptor_ < 0) fail("cannot create a file");
+  if (descriptor_ < 0) throw_errno("cannot create a file");
 }
 
 BufferedFile::~BufferedFile() {
@@ -44,7 +40,7 @@ void BufferedFile::decimal(std::uint64_t number) {
 
 void BufferedFile::close() {
   flush();
-  if (::close(std::exchange(descriptor_, -1)) != 0) fail("cannot write a file");
+  if (::close(std::exchange(descriptor_, -1)) != 0) throw_errno("cannot write a file");
 }
 
 void BufferedFile::copy_in(const void* data, std::size_t size) {
@@ -66,7 +62,7 @@ void BufferedFile::write_out(const std::byte* data, std::size_t size) {
   while (size > 0) {
     const ssize_t written = ::write(descriptor_, data, size);
     if (written < 0 && errno == EINTR) continue;
-    if (written < 0) fail("cannot write a file");
+    if (written < 0) throw_errno("cannot write a file");
     data += written;
     size -= static_cast<std::size_t>(written);
   }

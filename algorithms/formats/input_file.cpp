@@ -4,21 +4,16 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <cerrno>
-#include <system_error>
+#include "algorithms/formats/throw_errno.h"
 
 namespace volsmooth {
 namespace {
 
 constexpr std::size_t kBufferBytes = std::size_t{256} << 10;
 
-[[noreturn]] void fail(const char* what) {
-  throw std::system_error(errno, std::generic_category(), what);
-}
-
 int open_for_reading(const std::filesystem::path& file) {
   const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) fail("cannot open the input file");
+  if (descriptor < 0) throw_errno("cannot open the input file");
   ::posix_fadvise(descriptor, 0, 0, POSIX_FADV_SEQUENTIAL);
   return descriptor;
 }
@@ -32,7 +27,7 @@ InputFile::InputFile(const std::filesystem::path& file)
     const int error = errno;
     ::close(descriptor_);
     errno = error;
-    fail("cannot see the size of the input file");
+    throw_errno("cannot see the size of the input file");
   }
   size_ = status.st_size;
 }
@@ -45,7 +40,7 @@ std::span<const std::byte> InputFile::next() {
   while (unread_.empty()) {
     const ssize_t got = ::read(descriptor_, buffer_.data(), buffer_.size());
     if (got < 0 && errno == EINTR) continue;
-    if (got < 0) fail("cannot read the input file");
+    if (got < 0) throw_errno("cannot read the input file");
     unread_ = {buffer_.data(), static_cast<std::size_t>(got)};
     if (got == 0) break;
   }

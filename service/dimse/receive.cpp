@@ -19,8 +19,7 @@ using nlohmann::json;
 
 constexpr int kIdleSeconds = 300;                    ///< between two commands, and within one
 constexpr std::chrono::minutes kDaemonPatience{30};  ///< for an instance to be durable while others are, too
-constexpr std::int64_t kAddressSpaceBytes = std::int64_t{1}
-                                            << 30;  ///< nothing is kept but what is on its way
+constexpr std::int64_t kReceivingBytes = std::int64_t{1} << 30;  ///< nothing is kept but what is on its way
 
 /// Those that the reader of DICOM uploads knows, and so what is asked for first is taken as it is.
 constexpr const char* kTransferSyntaxes[] = {
@@ -209,7 +208,7 @@ void Receiving::store(const T_DIMSE_C_StoreRQ& request, T_ASC_PresentationContex
 void receive_instances() {
   Channel channel(kChannelDescriptor);
   dcmExternalSocketHandle.set(kConnectionDescriptor);  // so that DCMTK listens nowhere itself
-  enter_sandbox(kAddressSpaceBytes);
+  enter_sandbox(kReceivingBytes);
   Receiving(channel).run();
 }
 

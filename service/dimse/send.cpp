@@ -19,13 +19,13 @@ using nlohmann::json;
 constexpr int kConnectSeconds = 10, kResponseSeconds = 120;
 constexpr std::chrono::minutes kPatience{60};  // the daemon ends us when it does not want us any more
 /// An instance and DCMTK's copy of it, each with the most pixels that fit into a file.
-constexpr std::int64_t kAddressSpaceBytes = std::int64_t{10} << 30;
+constexpr std::int64_t kSendingBytes = std::int64_t{10} << 30;
 
 /// Shuts the sandbox as soon as the connection stands, before a byte of the peer's is looked at.
 class SandboxedLayer : public DcmTransportLayer {
  public:
   DcmTransportConnection* createConnection(DcmNativeSocketType socket, OFBool is_secure) override {
-    enter_sandbox(kAddressSpaceBytes);
+    enter_sandbox(kSendingBytes);
     return DcmTransportLayer::createConnection(socket, is_secure);
   }
 };

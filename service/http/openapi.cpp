@@ -9,10 +9,6 @@ namespace {
 
 using nlohmann::json;
 
-json reference(std::string_view schema) {
-  return {{"$ref", "#/components/schemas/" + std::string(schema)}};
-}
-
 json schema_of(const QueryParameter& parameter) {
   if (parameter.kind != QueryParameter::Kind::kText)
     return {{"type", parameter.kind == QueryParameter::Kind::kInteger ? "integer" : "number"},
@@ -57,7 +53,7 @@ json body_of(const Route& route) {
   if (route.body == BodyKind::kFile) {
     content["application/octet-stream"] = {{"schema", file}};
   } else {
-    content["application/json"] = {{"schema", reference(route.body_schema)}};
+    content["application/json"] = {{"schema", schema_reference(route.body_schema)}};
     form["required"].push_back("job");
     form["properties"]["job"] = {{"description", "The order without `volume`, as JSON."}, {"type", "string"}};
   }
@@ -70,12 +66,12 @@ json responses_of(const Route& route) {
   json success = {{"description", answer.description}};
   if (!answer.media_type.empty()) {
     json content = json::object();
-    if (!answer.schema.empty()) content["schema"] = reference(answer.schema);
+    if (!answer.schema.empty()) content["schema"] = schema_reference(answer.schema);
     success["content"][std::string(answer.media_type)] = content;
   }
   if (answer.tagged) success["headers"]["ETag"]["schema"]["type"] = "string";
   json problem = {{"description", "Why not."}};
-  problem["content"]["application/problem+json"]["schema"] = reference("Problem");
+  problem["content"]["application/problem+json"]["schema"] = schema_reference("Problem");
   return {{std::to_string(answer.status), success}, {"default", problem}};
 }
 

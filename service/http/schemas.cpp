@@ -6,14 +6,10 @@ namespace {
 
 using nlohmann::json;
 
-json reference(std::string_view schema) {
-  return {{"$ref", "#/components/schemas/" + std::string(schema)}};
-}
-
 json list_of(std::string_view member, std::string_view schema) {
   return {{"type", "object"},
           {"required", {member}},
-          {"properties", {{member, {{"type", "array"}, {"items", reference(schema)}}}}}};
+          {"properties", {{member, {{"type", "array"}, {"items", schema_reference(schema)}}}}}};
 }
 
 /// The documents whose form does not depend on what is on offer.

@@ -6,7 +6,8 @@
 
 #include <cerrno>
 #include <string>
-#include <system_error>
+
+#include "service/process/check.h"
 
 namespace volsmooth {
 namespace {
@@ -15,8 +16,7 @@ using Json = nlohmann::json;
 
 std::size_t size_of(int descriptor) {
   struct stat status {};
-  if (::fstat(descriptor, &status) != 0)
-    throw std::system_error(errno, std::generic_category(), "the size of a descriptor");
+  check(::fstat(descriptor, &status) == 0, "the size of a descriptor");
   return static_cast<std::size_t>(status.st_size);
 }
 
@@ -52,9 +52,18 @@ IngestCall open_call(Json options) {
   const std::size_t bytes = size_of(kUploadDescriptor);
   if (bytes == 0) return call;
   void* mapped = ::mmap(nullptr, bytes, PROT_READ, MAP_PRIVATE, kUploadDescriptor, 0);
-  if (mapped == MAP_FAILED) throw std::system_error(errno, std::generic_category(), "mapping the upload");
+  check(mapped != MAP_FAILED, "mapping the upload");
   call.upload = {static_cast<const std::byte*>(mapped), bytes};
   return call;
+}
+
+void write_output(std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(kOutputDescriptor, bytes.data(), bytes.size());
+    if (written < 0 && errno == EINTR) continue;
+    check(written > 0, "writing the output");
+    bytes = bytes.subspan(static_cast<std::size_t>(written));
+  }
 }
 
 Json answer_of(const Refusal& refusal) {

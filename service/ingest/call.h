@@ -32,6 +32,9 @@ nlohmann::json read_options();
 /// Maps the upload; throws std::system_error.
 IngestCall open_call(nlohmann::json options);
 
+/// Appends to what the command makes; throws std::system_error.
+void write_output(std::span<const std::byte> bytes);
+
 /// A refused upload as an answer.
 nlohmann::json answer_of(const Refusal& refusal);
 

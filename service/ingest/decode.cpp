@@ -2,29 +2,13 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <system_error>
 
 #include "service/ingest/commands.h"
 #include "service/ingest/volume_answer.h"
+#include "service/process/check.h"
 
 namespace volsmooth {
 namespace {
-
-[[noreturn]] void fail(const char* what) {
-  throw std::system_error(errno, std::generic_category(), what);
-}
-
-void append(const void* bytes, std::size_t count) {
-  const char* next = static_cast<const char*>(bytes);
-  while (count > 0) {
-    const ssize_t written = ::write(kOutputDescriptor, next, count);
-    if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) fail("writing the output");
-    next += written;
-    count -= static_cast<std::size_t>(written);
-  }
-}
 
 /// Which voxels are padding, and their intensities.
 struct Padding {
@@ -41,7 +25,7 @@ struct Padding {
 void fill(const Padding& padding, std::size_t voxels, float intensity) {
   void* mapped =
       ::mmap(nullptr, voxels * sizeof(float), PROT_READ | PROT_WRITE, MAP_SHARED, kOutputDescriptor, 0);
-  if (mapped == MAP_FAILED) fail("mapping the voxels");
+  check(mapped != MAP_FAILED, "mapping the voxels");
   float* const written = static_cast<float*>(mapped);
   for (std::size_t byte = 0; byte < padding.bits.size(); ++byte) {
     if (padding.bits[byte] == 0) continue;
@@ -59,7 +43,7 @@ nlohmann::json answer_decode(const IngestCall& call) {
   Padding padding{std::vector<std::uint8_t>((voxels + 7) / 8), {}};
   const auto take = [&](std::int64_t slice, std::span<const float> intensities,
                         std::span<const std::uint8_t> padded) {
-    append(intensities.data(), intensities.size_bytes());
+    write_output(std::as_bytes(intensities));
     const std::size_t first = static_cast<std::size_t>(slice) * intensities.size();
     for (std::size_t i = 0; i < padded.size(); ++i)
       if (padded[i] != 0) padding.mark(first + i, intensities[i]);
@@ -68,8 +52,8 @@ nlohmann::json answer_decode(const IngestCall& call) {
   if (!facts) return answer_of(facts.error());
   if (facts->padded_voxels > 0) {
     fill(padding, voxels, static_cast<float>(facts->intensity_min));
-    append(padding.bits.data(), padding.bits.size());
-    append(padding.intensities.data(), padding.intensities.size() * sizeof(float));
+    write_output(std::as_bytes(std::span(padding.bits)));
+    write_output(std::as_bytes(std::span(padding.intensities)));
   }
   return volume_answer(*series, *facts);
 }

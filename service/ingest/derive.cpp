@@ -1,16 +1,15 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
-#include <cerrno>
 #include <charconv>
 #include <stdexcept>
-#include <system_error>
 
 #include "algorithms/formats/dicom/derived_series.h"
 #include "algorithms/formats/dicom/encapsulated_mesh.h"
 #include "algorithms/formats/dicom/surface_segmentation.h"
 #include "algorithms/formats/zip_writer.h"
 #include "service/ingest/commands.h"
+#include "service/process/check.h"
 
 namespace volsmooth {
 namespace {
@@ -19,28 +18,15 @@ using Json = nlohmann::json;
 using Bytes = std::span<const std::byte>;
 using Made = tl::expected<Json, Refusal>;
 
-[[noreturn]] void fail(const char* what) {
-  throw std::system_error(errno, std::generic_category(), what);
-}
-
 /// What the command needs beside the upload.
 Bytes map_input() {
   const off_t end = ::lseek(kInputDescriptor, 0, SEEK_END);
-  if (end < 0) fail("the size of the input");
+  check(end >= 0, "the size of the input");
   const auto size = static_cast<std::size_t>(end);
   if (size == 0) return {};
   void* mapped = ::mmap(nullptr, size, PROT_READ, MAP_PRIVATE, kInputDescriptor, 0);
-  if (mapped == MAP_FAILED) fail("mapping the input");
+  check(mapped != MAP_FAILED, "mapping the input");
   return {static_cast<const std::byte*>(mapped), size};
-}
-
-void write_output(Bytes bytes) {
-  while (!bytes.empty()) {
-    const ssize_t written = ::write(kOutputDescriptor, bytes.data(), bytes.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) fail("writing the output");
-    bytes = bytes.subspan(static_cast<std::size_t>(written));
-  }
 }
 
 UidSeed seed_from(const std::string& hexadecimal) {

@@ -20,32 +20,13 @@ json or_null(const std::optional<Time>& time) {
   return time ? json(rfc3339(*time)) : json(nullptr);
 }
 
-json to_json(const ParameterValue& value) {
+json value_of(const ParameterValue& value) {
   return std::visit([](const auto& held) { return json(held); }, value);
 }
 
 json isovalue_of(const Result& result) {
   if (result.many_surfaces) return result.isovalues;
   return result.isovalues.empty() ? json(nullptr) : json(result.isovalues.front());
-}
-
-json to_json(const ParameterInfo& info) {
-  json document = {{"name", info.name},
-                   {"description", info.description},
-                   {"unit", or_null(info.unit)},
-                   {"default", info.default_value ? to_json(*info.default_value) : json(nullptr)}};
-  if (info.is_isovalue) {
-    document.update({{"type", "number"}});
-  } else if (info.choices.empty()) {
-    document.update({{"type", "number"}, {"minimum", info.minimum}, {"maximum", info.maximum}});
-  } else {
-    document.update({{"type", "string"}, {"choices", info.choices}});
-  }
-  if (!info.default_text.empty()) document["default_text"] = info.default_text;
-  if (!info.excludes.empty()) document["excludes"] = info.excludes;
-  if (!info.needs.empty()) document["needs"] = info.needs;
-  if (info.required) document["required"] = true;
-  return document;
 }
 
 template <class Item>
@@ -157,7 +138,26 @@ json to_json(const JobProgress& progress) {
 
 json to_json(const ParameterValues& parameters) {
   json document = json::object();
-  for (const auto& [name, value] : parameters) document[name] = to_json(value);
+  for (const auto& [name, value] : parameters) document[name] = value_of(value);
+  return document;
+}
+
+json to_json(const ParameterInfo& info) {
+  json document = {{"name", info.name},
+                   {"description", info.description},
+                   {"unit", or_null(info.unit)},
+                   {"default", info.default_value ? value_of(*info.default_value) : json(nullptr)}};
+  if (info.is_isovalue) {
+    document.update({{"type", "number"}});
+  } else if (info.choices.empty()) {
+    document.update({{"type", "number"}, {"minimum", info.minimum}, {"maximum", info.maximum}});
+  } else {
+    document.update({{"type", "string"}, {"choices", info.choices}});
+  }
+  if (!info.default_text.empty()) document["default_text"] = info.default_text;
+  if (!info.excludes.empty()) document["excludes"] = info.excludes;
+  if (!info.needs.empty()) document["needs"] = info.needs;
+  if (info.required) document["required"] = true;
   return document;
 }
 

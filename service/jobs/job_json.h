@@ -16,6 +16,7 @@ nlohmann::json to_json(const Result& result);
 nlohmann::json to_json(const JobOrder& order);
 nlohmann::json to_json(const JobProgress& progress);
 nlohmann::json to_json(const ParameterValues& parameters);
+nlohmann::json to_json(const ParameterInfo& info);
 nlohmann::json to_json(const MethodInfo& method);
 /// `type`, `detail` and the problem's own members; title and status are HTTP's to add.
 nlohmann::json to_json(const Problem& problem);

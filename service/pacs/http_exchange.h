@@ -12,6 +12,8 @@
 
 namespace volsmooth {
 
+inline constexpr long kOk = 200;
+
 struct NodeRequest {
   std::string target;  ///< appended to the node's address
   std::vector<std::string> headers = {};

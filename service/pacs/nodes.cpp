@@ -19,28 +19,28 @@ using nlohmann::json;
 
 constexpr int kHighestPort = 65535;
 
-[[noreturn]] void fail(const std::string& name, const std::string& what) {
+[[noreturn]] void refuse_node(const std::string& name, const std::string& what) {
   throw std::runtime_error("configuration, node '" + name + "': " + what);
 }
 
 std::string text_in(const json& node, const std::string& name, const char* member) {
   const auto found = node.find(member);
   if (found == node.end()) return {};
-  if (!found->is_string()) fail(name, std::string("'") + member + "' must be text");
+  if (!found->is_string()) refuse_node(name, std::string("'") + member + "' must be text");
   return found->get<std::string>();
 }
 
 std::string credentials_from(const std::string& name, const std::filesystem::path& file) {
   struct stat facts {};
-  if (::stat(file.c_str(), &facts) != 0) fail(name, "'credentials_file' cannot be read");
+  if (::stat(file.c_str(), &facts) != 0) refuse_node(name, "'credentials_file' cannot be read");
   if ((facts.st_mode & (S_IRWXG | S_IRWXO)) != 0)
-    fail(name, "'credentials_file' must be its owner's alone; run: chmod 600 on it");
+    refuse_node(name, "'credentials_file' must be its owner's alone; run: chmod 600 on it");
   std::ifstream in(file);
   std::string line;
   if (!std::getline(in, line) || line.empty())
-    fail(name, "'credentials_file' must hold one line, user:password or a token");
+    refuse_node(name, "'credentials_file' must hold one line, user:password or a token");
   if (std::ranges::any_of(line, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7F; }))
-    fail(name, "'credentials_file' holds control characters");
+    refuse_node(name, "'credentials_file' holds control characters");
   return line;
 }
 
@@ -50,50 +50,50 @@ void know(const json& object, const std::string& name, std::initializer_list<std
     if (std::ranges::find(known, member) != known.end()) continue;
     std::string list;
     for (const std::string_view one : known) list += (list.empty() ? "" : ", ") + std::string(one);
-    fail(name, "'" + member + "' is not known; known are " + list);
+    refuse_node(name, "'" + member + "' is not known; known are " + list);
   }
 }
 
 std::string ae_title_in(const json& peer, const std::string& name, const char* member) {
   std::string title = text_in(peer, name, member);
-  if (!is_ae_title(title)) fail(name, std::string("'") + member + "' must be " + kAeTitleRule);
+  if (!is_ae_title(title)) refuse_node(name, std::string("'") + member + "' must be " + kAeTitleRule);
   return title;
 }
 
 DimsePeer peer_from(const std::string& name, const json& configured) {
-  if (!configured.is_object()) fail(name, "'dimse' must be an object with 'host', 'port' and 'aet'");
+  if (!configured.is_object()) refuse_node(name, "'dimse' must be an object with 'host', 'port' and 'aet'");
   know(configured, name, {"host", "port", "aet", "calling_aet"});
   DimsePeer peer{text_in(configured, name, "host"), 0, ae_title_in(configured, name, "aet"), kOurAeTitle};
   const auto of_host = [](char c) {
     return std::isalnum(static_cast<unsigned char>(c)) || c == '-' || c == '.';
   };
   if (peer.host.empty() || !std::ranges::all_of(peer.host, of_host))
-    fail(name, "'host' must be a name or an IPv4 address");
+    refuse_node(name, "'host' must be a name or an IPv4 address");
   const json port = configured.value("port", json());
   if (!port.is_number_integer() || port < 1 || port > kHighestPort)
-    fail(name, "'port' must be a number from 1 to 65535");
+    refuse_node(name, "'port' must be a number from 1 to 65535");
   port.get_to(peer.port);
   if ((peer.host + ":" + std::to_string(peer.port)).size() > kLongestAddress)
-    fail(name, "'host', a colon and 'port' must be " + std::to_string(kLongestAddress) +
-                   " characters at most; give a shorter name of the host, or its address");
+    refuse_node(name, "'host', a colon and 'port' must be " + std::to_string(kLongestAddress) +
+                          " characters at most; give a shorter name of the host, or its address");
   if (configured.contains("calling_aet")) peer.calling = ae_title_in(configured, name, "calling_aet");
   return peer;
 }
 
 Node node_from(const std::string& name, const json& configured) {
-  if (!is_id_shaped(name)) fail(name, "a name has 1 to 64 letters, digits, '-' and '_'");
-  if (!configured.is_object()) fail(name, "must be an object with 'dicomweb' or 'dimse'");
+  if (!is_id_shaped(name)) refuse_node(name, "a name has 1 to 64 letters, digits, '-' and '_'");
+  if (!configured.is_object()) refuse_node(name, "must be an object with 'dicomweb' or 'dimse'");
   if (configured.contains("dimse")) {
-    if (configured.size() > 1) fail(name, "a node with 'dimse' has no other member");
+    if (configured.size() > 1) refuse_node(name, "a node with 'dimse' has no other member");
     return {.name = name, .dimse = peer_from(name, configured["dimse"])};
   }
   know(configured, name, {"dicomweb", "credentials_file", "dimse"});
 
   Node node{name, text_in(configured, name, "dicomweb")};
   if (!node.url.starts_with("http://") && !node.url.starts_with("https://"))
-    fail(name, "'dicomweb' must be an http:// or https:// address");
+    refuse_node(name, "'dicomweb' must be an http:// or https:// address");
   if (node.url.find_first_of(" ?#") != std::string::npos)
-    fail(name, "'dicomweb' must be an address without a query");
+    refuse_node(name, "'dicomweb' must be an address without a query");
   while (node.url.ends_with('/')) node.url.pop_back();
   if (const std::string file = text_in(configured, name, "credentials_file"); !file.empty()) {
     std::string credentials = credentials_from(name, file);

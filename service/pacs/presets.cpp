@@ -13,18 +13,18 @@ namespace {
 
 using nlohmann::json;
 
-[[noreturn]] void fail(const std::string& name, const std::string& what) {
+[[noreturn]] void refuse_preset(const std::string& name, const std::string& what) {
   throw std::runtime_error("configuration, preset '" + name + "': " + what);
 }
 
 JobOrder order_in(const std::string& name, json job) {
-  if (!job.is_object()) fail(name, "'job' must be an order without a volume, such as {}");
+  if (!job.is_object()) refuse_preset(name, "'job' must be an order without a volume, such as {}");
   for (const char* member : {"volume", "source", "destination"})
-    if (job.contains(member)) fail(name, std::string("'job' must be without '") + member + "'");
+    if (job.contains(member)) refuse_preset(name, std::string("'job' must be without '") + member + "'");
   if (!job.contains("outputs")) job["outputs"] = {"dicom-series"};
   job["volume"] = "v-0";
   auto order = order_from(job);
-  if (!order) fail(name, order.error().detail);
+  if (!order) refuse_preset(name, order.error().detail);
   order->volume.clear();
   return *std::move(order);
 }
@@ -32,7 +32,7 @@ JobOrder order_in(const std::string& name, json job) {
 std::chrono::milliseconds quiet_in(const std::string& name, const json& seconds) {
   constexpr double kLongest = 3600;
   if (!seconds.is_number() || !(seconds.get<double>() > 0 && seconds.get<double>() <= kLongest))
-    fail(name, "'quiet_seconds' must be a number above 0, at most 3600");
+    refuse_preset(name, "'quiet_seconds' must be a number above 0, at most 3600");
   return std::chrono::milliseconds(static_cast<std::int64_t>(1000 * seconds.get<double>()));
 }
 
@@ -44,22 +44,22 @@ std::string title_from(std::string name) {
 }
 
 Preset preset_from(const std::string& name, const json& configured) {
-  if (!is_id_shaped(name)) fail(name, "a name has 1 to 64 letters, digits, '-' and '_'");
-  if (!configured.is_object()) fail(name, "must be an object with 'job' and 'destination'");
+  if (!is_id_shaped(name)) refuse_preset(name, "a name has 1 to 64 letters, digits, '-' and '_'");
+  if (!configured.is_object()) refuse_preset(name, "must be an object with 'job' and 'destination'");
   Preset preset{name, order_in(name, configured.value("job", json::object()))};
   preset.aet = title_from(name);
   for (const auto& [member, value] : configured.items()) {
     if (member == "destination") {
-      if (!value.is_string()) fail(name, "'destination' must be the name of a node");
+      if (!value.is_string()) refuse_preset(name, "'destination' must be the name of a node");
       preset.order.destination = value;
     } else if (member == "quiet_seconds") {
       preset.quiet = quiet_in(name, value);
     } else if (member == "aet") {
       if (!value.is_string() || !is_ae_title(value.get_ref<const std::string&>()))
-        fail(name, std::string("'aet' must be ") + kAeTitleRule);
+        refuse_preset(name, std::string("'aet' must be ") + kAeTitleRule);
       preset.aet = value;
     } else if (member != "job") {
-      fail(name, "'" + member + "' is not known; known are job, destination, quiet_seconds and aet");
+      refuse_preset(name, "'" + member + "' is not known; known are job, destination, quiet_seconds and aet");
     }
   }
   return preset;

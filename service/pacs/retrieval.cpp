@@ -10,16 +10,16 @@ namespace {
 
 using nlohmann::json;
 
-constexpr long kOk = 200, kNoContent = 204, kNotFound = 404;
+constexpr long kNoContent = 204, kNotFound = 404;
 
-tl::unexpected<NodeFailure> fail(std::string slug, std::string detail, bool passing,
-                                 json members = json::object()) {
+tl::unexpected<NodeFailure> failed(std::string slug, std::string detail, bool passing,
+                                   json members = json::object()) {
   return tl::unexpected(NodeFailure{{std::move(slug), std::move(detail), std::move(members)}, passing});
 }
 
 tl::unexpected<NodeFailure> not_there(const Node& node) {
-  return fail("source-not-found", "The node '" + node.name + "' has no such series.", false,
-              {{"node", node.name}});
+  return failed("source-not-found", "The node '" + node.name + "' has no such series.", false,
+                {{"node", node.name}});
 }
 
 /// How many instances the node lists of the series.
@@ -30,8 +30,8 @@ tl::expected<int, NodeFailure> listed_instances(const Node& node, const std::str
   if (answer->status != kOk) return tl::unexpected(failure_of_status(node, answer->status));
   const auto list = json::parse(answer->body, nullptr, false);
   if (!list.is_array())
-    return fail("node-refused", "The node '" + node.name + "' gave no list of the series' instances.", false,
-                {{"node", node.name}});
+    return failed("node-refused", "The node '" + node.name + "' gave no list of the series' instances.",
+                  false, {{"node", node.name}});
   if (list.empty()) return not_there(node);
   return static_cast<int>(list.size());
 }
@@ -88,16 +88,16 @@ tl::expected<void, NodeFailure> retrieve_series(const Node& node, const DicomSou
     too_large = true;
   }
   if (too_large)
-    return fail("content-too-large", "The series is larger than an upload may be.", false,
-                {{"limit_bytes", max_bytes}});
+    return failed("content-too-large", "The series is larger than an upload may be.", false,
+                  {{"limit_bytes", max_bytes}});
   if (!answer) return tl::unexpected(answer.error());
   if (answer->status == kNoContent || answer->status == kNotFound) return not_there(node);
   if (answer->status != kOk) return tl::unexpected(failure_of_status(node, answer->status));
   const int came = counter ? counter->parts() : 0;
   if (came < *listed)
-    return fail("series-incomplete",
-                "The node '" + node.name + "' lists more instances of the series than it gave.", true,
-                {{"node", node.name}, {"listed", *listed}, {"came", came}});
+    return failed("series-incomplete",
+                  "The node '" + node.name + "' lists more instances of the series than it gave.", true,
+                  {{"node", node.name}, {"listed", *listed}, {"came", came}});
   return {};
 }
 

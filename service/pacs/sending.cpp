@@ -12,7 +12,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr long kOk = 200, kAccepted = 202, kConflict = 409;
+constexpr long kAccepted = 202, kConflict = 409;
 constexpr std::size_t kBatchBytes = std::size_t{16} << 20;
 const std::string kBoundary = "volsmooth-5dd7f1a2c4e94f0b";
 

@@ -24,7 +24,7 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr int kFirstSeriesNumber = 9001;  ///< behind those that devices give
-constexpr std::int64_t kMiB = std::int64_t{1} << 20;
+constexpr std::int64_t kSpareBytes = std::int64_t{256} << 20;
 
 std::string random_seed() {
   std::array<unsigned char, 16> bytes{};
@@ -186,7 +186,7 @@ Json DicomResults::derive(const std::filesystem::path& file, const Json& options
   order.options["derive"] = options;
   // The input is mapped, and held in the object up to three times while that grows.
   for (const char* const limit : {"address_space_bytes", "output_bytes"})
-    order.options[limit] = order.options[limit].get<std::int64_t>() + 4 * given + 256 * kMiB;
+    order.options[limit] = order.options[limit].get<std::int64_t>() + 4 * given + kSpareBytes;
   order.patience = patience_for(order.options);
   const auto program = limits_.ingest_program.empty() ? ingest_beside_this_program() : limits_.ingest_program;
   const auto answer = run_ingest(program, order, report);

@@ -42,7 +42,7 @@ constexpr std::array kShortForms = {"AE"sv, "AS"sv, "AT"sv, "CS"sv, "DA"sv, "DS"
 constexpr std::array kLongForms = {"OB"sv, "OD"sv, "OF"sv, "OL"sv, "OV"sv, "OW"sv, "SQ"sv,
                                    "SV"sv, "UC"sv, "UN"sv, "UR"sv, "UT"sv, "UV"sv};
 
-std::string_view text_of(const std::array<char, 2>& vr) {
+std::string_view letters_of(const std::array<char, 2>& vr) {
   return {vr.data(), vr.size()};
 }
 
@@ -141,8 +141,8 @@ class Walk {
   std::uint32_t read_length(std::array<char, 2>& vr, std::size_t end) {
     if (!explicit_vr_) return read<std::uint32_t>();
     vr = {read<char>(), read<char>()};
-    if (std::ranges::find(kShortForms, text_of(vr)) != kShortForms.end()) return read<std::uint16_t>();
-    if (std::ranges::find(kLongForms, text_of(vr)) == kLongForms.end()) {
+    if (std::ranges::find(kShortForms, letters_of(vr)) != kShortForms.end()) return read<std::uint16_t>();
+    if (std::ranges::find(kLongForms, letters_of(vr)) == kLongForms.end()) {
       refuse_dicom("dicom-bad-vr", "A data element has a value representation that DICOM does not know.");
     }
     need(6, end);
@@ -168,13 +168,13 @@ class Walk {
 
   /// Implicit files do not say what is a sequence: its first item does. So do readers tell it apart.
   bool holds_items(const Element& element, std::size_t length) {
-    if (text_of(element.vr) == "SQ") return true;
+    if (letters_of(element.vr) == "SQ") return true;
     return !explicit_vr_ && element.tag != kPixelData && length >= 8 && peek_tag() == kItem;
   }
 
   void open_ended(std::size_t index, std::size_t end, int depth) {
     const Element element = elements_[index];
-    const std::string_view vr = text_of(element.vr);
+    const std::string_view vr = letters_of(element.vr);
     if (element.tag == kPixelData && depth == 0) {
       fragments(end);
     } else if (vr == "SQ" || !explicit_vr_) {

@@ -5,17 +5,17 @@
 namespace volsmooth {
 namespace {
 
-struct Case {
+struct HostCase {
   std::vector<std::string> hosts;
   std::string slug;  ///< empty: accepted
 };
 
-std::ostream& operator<<(std::ostream& out, const Case& one) {
+std::ostream& operator<<(std::ostream& out, const HostCase& one) {
   for (const auto& host : one.hosts) out << host << ' ';
   return out << one.slug;
 }
 
-class HostCheck : public testing::TestWithParam<Case> {};
+class HostCheck : public testing::TestWithParam<HostCase> {};
 
 TEST_P(HostCheck, GivesItsAnswer) {
   Head head;
@@ -29,16 +29,17 @@ TEST_P(HostCheck, GivesItsAnswer) {
 // malicious-input row H10.
 INSTANTIATE_TEST_SUITE_P(
     Rows, HostCheck,
-    testing::Values(Case{{"localhost"}, ""}, Case{{"LocalHost:8742"}, ""}, Case{{"127.0.0.1:1"}, ""},
-                    Case{{"[::1]"}, ""}, Case{{"[::1]:8742"}, ""}, Case{{"volsmooth.hospital.example"}, ""},
-                    Case{{}, "bad-host"}, Case{{""}, "bad-host"},
-                    Case{{"localhost", "localhost"}, "bad-host"}, Case{{"localhost:"}, "bad-host"},
-                    Case{{"localhost:80x"}, "bad-host"}, Case{{"localhost:123456"}, "bad-host"},
-                    Case{{"[::1"}, "bad-host"}, Case{{"evil.example"}, "misdirected-request"},
-                    Case{{"localhost.evil.example"}, "misdirected-request"},
-                    Case{{"evil.example:8742"}, "misdirected-request"},
-                    Case{{"127.0.0.2"}, "misdirected-request"},
-                    Case{{"localhost, evil.example"}, "misdirected-request"}));
+    testing::Values(HostCase{{"localhost"}, ""}, HostCase{{"LocalHost:8742"}, ""},
+                    HostCase{{"127.0.0.1:1"}, ""}, HostCase{{"[::1]"}, ""}, HostCase{{"[::1]:8742"}, ""},
+                    HostCase{{"volsmooth.hospital.example"}, ""}, HostCase{{}, "bad-host"},
+                    HostCase{{""}, "bad-host"}, HostCase{{"localhost", "localhost"}, "bad-host"},
+                    HostCase{{"localhost:"}, "bad-host"}, HostCase{{"localhost:80x"}, "bad-host"},
+                    HostCase{{"localhost:123456"}, "bad-host"}, HostCase{{"[::1"}, "bad-host"},
+                    HostCase{{"evil.example"}, "misdirected-request"},
+                    HostCase{{"localhost.evil.example"}, "misdirected-request"},
+                    HostCase{{"evil.example:8742"}, "misdirected-request"},
+                    HostCase{{"127.0.0.2"}, "misdirected-request"},
+                    HostCase{{"localhost, evil.example"}, "misdirected-request"}));
 
 struct OriginCase {
   HeaderField field;

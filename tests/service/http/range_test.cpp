@@ -7,16 +7,16 @@
 namespace volsmooth {
 namespace {
 
-struct Case {
+struct RangeCase {
   std::string field;
   std::vector<ByteRange> ranges;  ///< empty: the whole file
   bool satisfiable = true;
 };
-std::ostream& operator<<(std::ostream& out, const Case& one) {
+std::ostream& operator<<(std::ostream& out, const RangeCase& one) {
   return out << one.field;
 }
 
-class RangeTest : public testing::TestWithParam<Case> {};
+class RangeTest : public testing::TestWithParam<RangeCase> {};
 
 TEST_P(RangeTest, OfAThousandBytes) {
   const auto ranges = parse_range(GetParam().field, 1000);
@@ -30,17 +30,19 @@ TEST_P(RangeTest, OfAThousandBytes) {
 // malicious-input row H23.
 INSTANTIATE_TEST_SUITE_P(
     Rows, RangeTest,
-    testing::Values(Case{"bytes=0-0", {{0, 1}}}, Case{"bytes=0-999", {{0, 1000}}},
-                    Case{"bytes=10-19", {{10, 10}}}, Case{"bytes=990-", {{990, 10}}},
-                    Case{"bytes=990-5000", {{990, 10}}}, Case{"bytes=-10", {{990, 10}}},
-                    Case{"bytes=-5000", {{0, 1000}}}, Case{"Bytes=0-1", {{0, 2}}},
-                    Case{"bytes=0-1, 5-6", {{0, 2}, {5, 2}}}, Case{"bytes=0-1,2000-", {{0, 2}}},
-                    Case{"bytes=0-9223372036854775808", {{0, 1000}}}, Case{"", {}}, Case{"bytes=", {}},
-                    Case{"bytes=9-1", {}}, Case{"bytes=-", {}}, Case{"bytes=a-b", {}}, Case{"bytes=1", {}},
-                    Case{"bytes=+1-2", {}}, Case{"bytes=1-2,x", {}}, Case{"lines=1-2", {}},
-                    Case{"bytes=0-0,1-1,2-2,3-3,4-4,5-5,6-6,7-7,8-8", {}}, Case{"bytes=-0", {}, false},
-                    Case{"bytes=1000-", {}, false}, Case{"bytes=1000-2000", {}, false},
-                    Case{"bytes=9223372036854775808-", {}, false}));
+    testing::Values(RangeCase{"bytes=0-0", {{0, 1}}}, RangeCase{"bytes=0-999", {{0, 1000}}},
+                    RangeCase{"bytes=10-19", {{10, 10}}}, RangeCase{"bytes=990-", {{990, 10}}},
+                    RangeCase{"bytes=990-5000", {{990, 10}}}, RangeCase{"bytes=-10", {{990, 10}}},
+                    RangeCase{"bytes=-5000", {{0, 1000}}}, RangeCase{"Bytes=0-1", {{0, 2}}},
+                    RangeCase{"bytes=0-1, 5-6", {{0, 2}, {5, 2}}}, RangeCase{"bytes=0-1,2000-", {{0, 2}}},
+                    RangeCase{"bytes=0-9223372036854775808", {{0, 1000}}}, RangeCase{"", {}},
+                    RangeCase{"bytes=", {}}, RangeCase{"bytes=9-1", {}}, RangeCase{"bytes=-", {}},
+                    RangeCase{"bytes=a-b", {}}, RangeCase{"bytes=1", {}}, RangeCase{"bytes=+1-2", {}},
+                    RangeCase{"bytes=1-2,x", {}}, RangeCase{"lines=1-2", {}},
+                    RangeCase{"bytes=0-0,1-1,2-2,3-3,4-4,5-5,6-6,7-7,8-8", {}},
+                    RangeCase{"bytes=-0", {}, false}, RangeCase{"bytes=1000-", {}, false},
+                    RangeCase{"bytes=1000-2000", {}, false},
+                    RangeCase{"bytes=9223372036854775808-", {}, false}));
 
 TEST(Range, TenThousandRangesGetTheWholeFile) {
   std::string field = "bytes=0-0";

@@ -7,16 +7,16 @@
 namespace volsmooth {
 namespace {
 
-struct Case {
+struct TargetCase {
   std::string name;
   std::string target;
   std::string slug;  ///< empty: accepted
 };
-std::ostream& operator<<(std::ostream& out, const Case& one) {
+std::ostream& operator<<(std::ostream& out, const TargetCase& one) {
   return out << one.name;
 }
 
-class TargetTest : public testing::TestWithParam<Case> {};
+class TargetTest : public testing::TestWithParam<TargetCase> {};
 
 TEST_P(TargetTest, GivesItsAnswer) {
   const auto target = parse_target(GetParam().target);
@@ -24,26 +24,39 @@ TEST_P(TargetTest, GivesItsAnswer) {
 }
 
 // malicious-input rows H12 and H13.
-INSTANTIATE_TEST_SUITE_P(
-    Rows, TargetTest,
-    testing::Values(
-        Case{"plain", "/v1/jobs", ""}, Case{"root", "/", ""}, Case{"trailing_slash", "/v1/jobs/", ""},
-        Case{"name_with_dots_and_signs", "/v1/jobs/j-1/results/laplacian_iso-1e+06.stl", ""},
-        Case{"encoded_plus", "/v1/jobs/j-1/results/a%2Bb", ""}, Case{"query", "/v1/jobs?label=a%20b+c", ""},
-        Case{"high_byte", "/v1/\x80", "bad-target"}, Case{"nul", std::string("/v1\0", 4), "bad-target"},
-        Case{"space", "/v1/a b", "bad-target"}, Case{"star", "*", "bad-target"},
-        Case{"empty", "", "bad-target"}, Case{"absolute", "http://localhost/v1/jobs", "bad-target"},
-        Case{"fragment", "/v1#a", "bad-target"}, Case{"dot_dot", "/v1/jobs/../../admin", "bad-target"},
-        Case{"dot", "/v1/./jobs", "bad-target"}, Case{"encoded_dot_dot", "/v1/%2e%2e%2fadmin", "bad-target"},
-        Case{"encoded_dots", "/v1/%2E%2E/admin", "bad-target"},
-        Case{"encoded_slash", "/v1%2Fjobs", "bad-target"}, Case{"two_slashes", "//v1/jobs", "bad-target"},
-        Case{"inner_slashes", "/v1//jobs", "bad-target"}, Case{"encoded_nul", "/v1/%00", "bad-target"},
-        Case{"double_encoding", "/v1/%252e", "bad-target"}, Case{"overlong", "/v1/%c0%ae", "bad-target"},
-        Case{"backslash", "/v1\\jobs", "bad-target"}, Case{"cut_encoding", "/v1/%2", "bad-target"},
-        Case{"bad_encoding", "/v1/%zz", "bad-target"}, Case{"query_bad_encoding", "/?a=%zz", "bad-query"},
-        Case{"query_twice", "/?a=1&a=2", "bad-query"}, Case{"query_nameless", "/?=1", "bad-query"},
-        Case{"query_empty_pair", "/?a=1&&b=2", "bad-query"}, Case{"query_nul", "/?a=%00", "bad-query"}),
-    [](const auto& one) { return one.param.name; });
+INSTANTIATE_TEST_SUITE_P(Rows, TargetTest,
+                         testing::Values(TargetCase{"plain", "/v1/jobs", ""}, TargetCase{"root", "/", ""},
+                                         TargetCase{"trailing_slash", "/v1/jobs/", ""},
+                                         TargetCase{"name_with_dots_and_signs",
+                                                    "/v1/jobs/j-1/results/laplacian_iso-1e+06.stl", ""},
+                                         TargetCase{"encoded_plus", "/v1/jobs/j-1/results/a%2Bb", ""},
+                                         TargetCase{"query", "/v1/jobs?label=a%20b+c", ""},
+                                         TargetCase{"high_byte", "/v1/\x80", "bad-target"},
+                                         TargetCase{"nul", std::string("/v1\0", 4), "bad-target"},
+                                         TargetCase{"space", "/v1/a b", "bad-target"},
+                                         TargetCase{"star", "*", "bad-target"},
+                                         TargetCase{"empty", "", "bad-target"},
+                                         TargetCase{"absolute", "http://localhost/v1/jobs", "bad-target"},
+                                         TargetCase{"fragment", "/v1#a", "bad-target"},
+                                         TargetCase{"dot_dot", "/v1/jobs/../../admin", "bad-target"},
+                                         TargetCase{"dot", "/v1/./jobs", "bad-target"},
+                                         TargetCase{"encoded_dot_dot", "/v1/%2e%2e%2fadmin", "bad-target"},
+                                         TargetCase{"encoded_dots", "/v1/%2E%2E/admin", "bad-target"},
+                                         TargetCase{"encoded_slash", "/v1%2Fjobs", "bad-target"},
+                                         TargetCase{"two_slashes", "//v1/jobs", "bad-target"},
+                                         TargetCase{"inner_slashes", "/v1//jobs", "bad-target"},
+                                         TargetCase{"encoded_nul", "/v1/%00", "bad-target"},
+                                         TargetCase{"double_encoding", "/v1/%252e", "bad-target"},
+                                         TargetCase{"overlong", "/v1/%c0%ae", "bad-target"},
+                                         TargetCase{"backslash", "/v1\\jobs", "bad-target"},
+                                         TargetCase{"cut_encoding", "/v1/%2", "bad-target"},
+                                         TargetCase{"bad_encoding", "/v1/%zz", "bad-target"},
+                                         TargetCase{"query_bad_encoding", "/?a=%zz", "bad-query"},
+                                         TargetCase{"query_twice", "/?a=1&a=2", "bad-query"},
+                                         TargetCase{"query_nameless", "/?=1", "bad-query"},
+                                         TargetCase{"query_empty_pair", "/?a=1&&b=2", "bad-query"},
+                                         TargetCase{"query_nul", "/?a=%00", "bad-query"}),
+                         [](const auto& one) { return one.param.name; });
 
 TEST(Target, IsDecodedOnce) {
   const auto target = parse_target("/v1/a%2Bb?label=a%20b+c%2520&empty=&bare");

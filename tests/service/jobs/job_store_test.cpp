@@ -164,7 +164,7 @@ TEST_F(JobStoreTest, BehavesLikeItsModel) {
   std::vector<std::string> order;  // by age
   std::mt19937 random(2);
   const auto any_of = [&](const auto& list) { return list[random() % std::size(list)]; };
-  constexpr JobState kAll[] = {kQueued, kRunning, kSucceeded, kFailed, kCancelled};
+  constexpr JobState kStates[] = {kQueued, kRunning, kSucceeded, kFailed, kCancelled};
 
   for (int operation = 0; operation < 600; ++operation) {
     const unsigned kind = random() % 8;
@@ -195,7 +195,7 @@ TEST_F(JobStoreTest, BehavesLikeItsModel) {
       ASSERT_FALSE(jobs_.find(id));
       std::erase(order, id);
     } else {
-      const JobState from = any_of(kAll), to = any_of(kAll);
+      const JobState from = any_of(kStates), to = any_of(kStates);
       const int attempt = expected.attempt - static_cast<int>(random() % 3 == 0);
       if (!can_become(from, to) || to == kRunning) continue;
       const bool applies =

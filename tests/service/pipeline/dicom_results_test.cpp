@@ -24,7 +24,7 @@ const std::vector<std::string> kAllOutputs = {"nifti", "dicom-series", "dicom-st
                                               "dicom-surface-segmentation"};
 
 /// A ball of 8 mm in a tilted series; 100 is its surface.
-test::SeriesPhantom ball() {
+test::SeriesPhantom ball_series() {
   test::SeriesPhantom phantom;
   phantom.columns = phantom.rows = 28;
   phantom.slices = 14;
@@ -83,7 +83,8 @@ class DicomOutputs : public testing::Test {
   }
 
   ComputeTask task_for_ball() {
-    return task_for(folder_.put("upload", test::multipart_of(test::files_of(test::series_of(ball())))));
+    return task_for(
+        folder_.put("upload", test::multipart_of(test::files_of(test::series_of(ball_series())))));
   }
 
   std::vector<Result> run(const ComputeTask& task) {
