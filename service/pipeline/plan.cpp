@@ -11,10 +11,12 @@ namespace {
 /// A method works in place on the input; of several, all but the last work on a copy.
 constexpr double kBytesPerVoxelOfVolume = sizeof(float);
 
-/// A surface grows with its area, not the volume: 54 bytes a vertex, before and after, are this much for a
-/// vertex in every tenth voxel. What really comes out is held to the job's limit when it is counted
-/// (run_job.cpp).
-constexpr double kBytesPerVoxelOfSurface = 11;
+/// A surface with its normals takes 54 bytes a vertex: this much for a vertex in every tenth voxel, as noisy
+/// volumes of up to 512^3 have them; beyond, it grows with the area. What really comes out is held to the
+/// job's limit when it is counted (run_job.cpp).
+double bytes_per_voxel_of_surface(double voxels) {
+  return 5.5 * std::min(1.0, 512 / std::cbrt(voxels));
+}
 
 /// Of a DICOM volume: which voxels are padding, and what they held.
 constexpr double kBytesPerVoxelOfPadding = 4.125;
@@ -104,8 +106,10 @@ tl::expected<JobPlan, Problem> plan_job(const JobOrder& order, const VolumeFacts
   const double volumes_held = (parts.size() > 1 ? 2 : 1) + (copied ? 1 : 0);
   const double surfaces = order.isovalues ? static_cast<double>(order.isovalues->size()) : 1;
   const double padding = volume.format == "dicom" ? kBytesPerVoxelOfPadding : 0;
-  const double bytes_per_voxel = kBytesPerVoxelOfVolume * volumes_held + extra_bytes_per_voxel +
-                                 kBytesPerVoxelOfSurface * surfaces + padding;
+  // While it flows, the surfaces of the original are held; afterwards those of the result as well.
+  const double surface_bytes = bytes_per_voxel_of_surface(voxels) * surfaces;
+  const double bytes_per_voxel = kBytesPerVoxelOfVolume * volumes_held + surface_bytes +
+                                 std::max(extra_bytes_per_voxel, surface_bytes) + padding;
   plan.memory_bytes = kFixedBytes + static_cast<std::int64_t>(std::ceil(voxels * bytes_per_voxel));
   if (limits.max_memory_bytes > 0 && plan.memory_bytes > limits.max_memory_bytes) {
     return tl::unexpected(

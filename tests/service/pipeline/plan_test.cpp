@@ -72,8 +72,15 @@ TEST(Plan, EverySurfaceCountsInTheMemory) {
   const auto one = plan_job(order("mean-curvature-flow", 1, {300}), head(), {});
   const auto three = plan_job(order("mean-curvature-flow", 1, {100, 200, 300}), head(), {});
   const auto none = plan_job(order("mean-curvature-flow", 1, {}), head(), {});
-  EXPECT_EQ(three->memory_bytes - none->memory_bytes, 3 * (one->memory_bytes - none->memory_bytes));
+  const auto two = plan_job(order("mean-curvature-flow", 1, {100, 200}), head(), {});
+  EXPECT_GT(one->memory_bytes, none->memory_bytes);
+  EXPECT_EQ(three->memory_bytes - two->memory_bytes, two->memory_bytes - one->memory_bytes);
   EXPECT_GE(none->memory_bytes, 2 * 4 * 256 * 256 * 256);  // the volume, and the one it flows into
+}
+
+TEST(Plan, TheLargestVolumeAndASurfaceFitIntoTwelveGigabytes) {
+  const auto plan = plan_job(order("mean-curvature-flow", 1, {300}), head(1024), {});
+  EXPECT_LT(plan->memory_bytes, 12'000'000'000);
 }
 
 TEST(Plan, AJobThatCostsTooMuchIsRefusedWithBothNumbers) {
