@@ -61,7 +61,8 @@ void declare(CLI::App& app, Options& options) {
       ->envname("VOLSMOOTH_THREADS")
       ->check(CLI::Range(0, 4096))
       ->capture_default_str();
-  app.add_option("--workers", options.jobs.workers, "Jobs that run at the same time")
+  app.add_option("--workers", options.jobs.workers,
+                 "Jobs that run at the same time; of several, one place is kept for jobs of seconds")
       ->envname("VOLSMOOTH_WORKERS")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();

@@ -82,6 +82,7 @@ struct JobOrder {
 struct JobPlan {
   ParameterValues parameters;     ///< resolved: flow_time_mm2, step_mm2, steps, ...
   std::int64_t memory_bytes = 0;  ///< at the peak
+  bool is_long = false;           ///< takes more than seconds: not all places are for such jobs
 };
 
 /// One file that a job made.
@@ -134,6 +135,7 @@ struct Job {
   JobOrder order;
   ParameterValues parameters;  ///< resolved
   std::int64_t memory_bytes = 0;
+  bool is_long = false;
   JobProgress progress;
   Time created_at;
   std::optional<Time> started_at;

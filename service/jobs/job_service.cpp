@@ -146,6 +146,7 @@ tl::expected<Job, Problem> JobService::submit(const JobOrder& order) {
   job.order = order;
   job.parameters = std::move(plan.parameters);
   job.memory_bytes = plan.memory_bytes;
+  job.is_long = plan.is_long;
   job.progress.stage = "queued";
   job.created_at = now_in_milliseconds();
   switch (state_->jobs.insert(job, state_->settings.max_queued)) {

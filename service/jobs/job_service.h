@@ -19,7 +19,7 @@ namespace volsmooth {
 
 struct JobServiceSettings {
   std::filesystem::path data_dir;       ///< locked for this process; created when missing
-  int workers = 2;                      ///< jobs that run at the same time
+  int workers = 3;                      ///< jobs that run at the same time, one of them a job of seconds
   int threads = 0;                      ///< compute threads of a job; 0: all cores that it may use
   std::int64_t memory_limit_bytes = 0;  ///< running jobs together; 0: 80 % of what the process may use
   std::int64_t max_upload_bytes = std::int64_t{16} << 30;

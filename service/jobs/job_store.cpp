@@ -15,7 +15,8 @@ using nlohmann::json;
 
 constexpr std::string_view kSelectJob =
     "SELECT sequence, id, state, job_order, parameters, memory_bytes, created_ms, started_ms, finished_ms, "
-    "attempt, stage, fraction, error, deaths, cancel_requested, not_before_ms, source_tries FROM jobs ";
+    "attempt, stage, fraction, error, deaths, cancel_requested, not_before_ms, source_tries, is_long FROM "
+    "jobs ";
 
 std::optional<Time> time_or_none(const Statement& row, int column) {
   if (row.is_null(column)) return std::nullopt;
@@ -60,6 +61,7 @@ JobStore::Listed job_from(Database& database, const Statement& row) {
   if (!row.is_null(12)) job.error = problem_from_stored_json(json::parse(row.text(12)));
   if (job.state == JobState::kQueued && row.integer(15) > 0) job.next_attempt_at = time_of(row.integer(15));
   job.source_tries = static_cast<int>(row.integer(16));
+  job.is_long = row.integer(17) != 0;
   if (job.state == JobState::kSucceeded) {
     job.results = results_of(database, sequence);
     if (!job.order.destination.empty()) job.delivery = delivery_of(database, sequence);
@@ -106,11 +108,11 @@ std::string results_directory(std::string_view job_id, std::int64_t attempt) {
 int insert_row(Database& database, const Job& job) {
   return database.run(
       "INSERT INTO jobs (id, volume, method, label, state, job_order, parameters, memory_bytes, created_ms, "
-      "stage) "
-      "SELECT ?1, ?2, ?3, ?4, 'queued', ?5, ?6, ?7, ?8, 'queued' "
+      "is_long, stage) "
+      "SELECT ?1, ?2, ?3, ?4, 'queued', ?5, ?6, ?7, ?8, ?9, 'queued' "
       "WHERE ?2 = '' OR EXISTS (SELECT 1 FROM volumes WHERE id = ?2)",
       job.id, job.order.volume, job.order.method, job.order.label, to_json(job.order).dump(),
-      to_json(job.parameters).dump(), job.memory_bytes, milliseconds_of(job.created_at));
+      to_json(job.parameters).dump(), job.memory_bytes, milliseconds_of(job.created_at), job.is_long);
 }
 
 void take_retrieved(Database& database, const std::string& job_id, const Retrieved& retrieved) {
@@ -118,9 +120,10 @@ void take_retrieved(Database& database, const std::string& job_id, const Retriev
   JobOrder order = find_in(database, job_id).value().order;
   order.volume = retrieved.volume.id;
   database.run(
-      "UPDATE jobs SET volume = ?2, job_order = ?3, parameters = ?4, memory_bytes = ?5 WHERE id = ?1", job_id,
-      order.volume, to_json(order).dump(), to_json(retrieved.plan.parameters).dump(),
-      retrieved.plan.memory_bytes);
+      "UPDATE jobs SET volume = ?2, job_order = ?3, parameters = ?4, memory_bytes = ?5, is_long = ?6 WHERE "
+      "id = ?1",
+      job_id, order.volume, to_json(order).dump(), to_json(retrieved.plan.parameters).dump(),
+      retrieved.plan.memory_bytes, retrieved.plan.is_long);
 }
 
 constexpr std::string_view kCountQueued = "SELECT count(*) FROM jobs WHERE state = 'queued'";
@@ -158,14 +161,14 @@ std::vector<JobStore::Listed> JobStore::list(const JobQuery& query, std::optiona
   });
 }
 
-std::optional<Job> JobStore::claim(std::int64_t most_memory_bytes, Work work) {
+std::optional<Job> JobStore::claim(std::int64_t most_memory_bytes, Work work, bool long_ones) {
   const bool has_volume = work == Work::kCompute;
   const std::int64_t now = milliseconds_of(now_in_milliseconds());
   const auto oldest = [&](Database& database) {
     return database.query(
         "SELECT id, attempt, memory_bytes FROM jobs WHERE sequence = (SELECT min(sequence) FROM jobs "
-        "WHERE state = 'queued' AND (volume <> '') = ? AND not_before_ms <= ?)",
-        has_volume, now);
+        "WHERE state = 'queued' AND (volume <> '') = ? AND not_before_ms <= ? AND is_long <= ?)",
+        has_volume, now, long_ones);
   };
   if (!database_.read([&](Database& database) { return oldest(database).step(); })) return std::nullopt;
   return database_.write([&](Database& database) -> std::optional<Job> {

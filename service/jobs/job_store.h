@@ -57,8 +57,8 @@ class JobStore {
   /// What is to be done for a queued job: fetch its series, or compute.
   enum class Work { kRetrieve, kCompute };
   /// The oldest queued job with that to be done becomes a running one, provided that it needs no more memory
-  /// than this.
-  std::optional<Job> claim(std::int64_t most_memory_bytes, Work work = Work::kCompute);
+  /// than this. Without `long_ones`: the oldest that is not long.
+  std::optional<Job> claim(std::int64_t most_memory_bytes, Work work = Work::kCompute, bool long_ones = true);
   /// False: the job is not in that state and attempt any more, or was asked to be cancelled.
   bool change(const JobChange& change);
 

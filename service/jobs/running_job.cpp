@@ -18,7 +18,11 @@ constexpr auto kFirstEstimate = 2s;  // before it the elapsed time says little
 }  // namespace
 
 RunningJob::RunningJob(const Job& job, EventCounter& numbers)
-    : id_(job.id), memory_bytes_(job.memory_bytes), numbers_(numbers), stage_(job.progress.stage) {}
+    : id_(job.id),
+      memory_bytes_(job.memory_bytes),
+      is_long_(job.is_long),
+      numbers_(numbers),
+      stage_(job.progress.stage) {}
 
 void RunningJob::interrupt(Interruption why) {
   Interruption none = Interruption::kNone;

@@ -19,6 +19,7 @@ class RunningJob {
 
   const std::string& id() const { return id_; }
   std::int64_t memory_bytes() const { return memory_bytes_; }
+  bool is_long() const { return is_long_; }
 
   /// Makes the next report throw. A cancel stands even when the daemon stops as well.
   void interrupt(Interruption why);
@@ -39,6 +40,7 @@ class RunningJob {
 
   const std::string id_;
   const std::int64_t memory_bytes_;
+  const bool is_long_;
   EventCounter& numbers_;
   const Clock::time_point started_ = Clock::now();
   std::atomic<Interruption> interruption_ = Interruption::kNone;

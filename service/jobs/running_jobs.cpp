@@ -1,5 +1,7 @@
 #include "service/jobs/running_jobs.h"
 
+#include <algorithm>
+
 namespace volsmooth {
 
 void RunningJobs::add(std::shared_ptr<RunningJob> job) {
@@ -34,6 +36,12 @@ std::int64_t RunningJobs::memory_bytes() const {
   std::int64_t sum = 0;
   for (const auto& [id, job] : jobs_) sum += job->memory_bytes();
   return sum;
+}
+
+int RunningJobs::long_ones() const {
+  const std::lock_guard lock(mutex_);
+  return static_cast<int>(
+      std::ranges::count_if(jobs_, [](const auto& entry) { return entry.second->is_long(); }));
 }
 
 }  // namespace volsmooth

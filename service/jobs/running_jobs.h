@@ -19,6 +19,7 @@ class RunningJobs {
 
   bool empty() const;
   std::int64_t memory_bytes() const;  ///< of all together
+  int long_ones() const;
 
  private:
   mutable std::mutex mutex_;

@@ -109,11 +109,13 @@ WorkerPool::Work JobService::State::claim(JobStore::Work work) {
   if (stopping) return {};
   recover();
   // Strictly the oldest first: when it does not fit beside the running ones, the others wait with it for
-  // these to end, so nothing starves. Alone, a job always fits.
+  // these to end, so nothing starves. Alone, a job always fits. Only past long jobs, which wait for one of
+  // their own to end, go those of seconds: a place is theirs.
   const std::int64_t used = running.memory_bytes();
   const std::int64_t free =
       used == 0 ? std::numeric_limits<std::int64_t>::max() : settings.memory_limit_bytes - used;
-  auto job = jobs.claim(free, work);
+  const bool long_ones = running.long_ones() < std::max(1, settings.workers - 1);
+  auto job = jobs.claim(free, work, long_ones);
   if (!job) return {};
   const auto claimed =
       std::make_shared<ClaimedJob>(*std::move(job), jobs.event_counter(), running,

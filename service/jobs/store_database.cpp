@@ -120,8 +120,12 @@ constexpr const char* kNodes = R"(
   CREATE INDEX arrivals_by_file ON arrivals (file);
 )";
 
+constexpr const char* kLongJobs = R"(
+  ALTER TABLE jobs ADD COLUMN is_long INTEGER NOT NULL DEFAULT 0;
+)";
+
 /// What makes each version of the schema of the one before.
-constexpr std::array kVersions = {kFirstSchema, kIndexByState, kNodes};
+constexpr std::array kVersions = {kFirstSchema, kIndexByState, kNodes, kLongJobs};
 constexpr std::size_t kNewestVersion = kVersions.size();
 
 std::size_t schema_version(Database& database) {

@@ -1,7 +1,9 @@
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "algorithms/formats/mesh_writers.h"
+#include "service/pipeline/costs.h"
 #include "service/pipeline/parts.h"
 #include "service/pipeline/stages.h"
 
@@ -17,6 +19,9 @@ constexpr double kBytesPerVoxelOfVolume = sizeof(float);
 double bytes_per_voxel_of_surface(double voxels) {
   return 5.5 * std::min(1.0, 512 / std::cbrt(voxels));
 }
+
+/// Jobs that take no longer may overtake those that do.
+constexpr double kSecondsOfShortJob = 10;
 
 /// Of a DICOM volume: which voxels are padding, and what they held.
 constexpr double kBytesPerVoxelOfPadding = 4.125;
@@ -74,6 +79,12 @@ tl::expected<void, Problem> check_outputs(const JobOrder& order, const VolumeFac
 
 }  // namespace
 
+std::string gigabytes(std::int64_t bytes) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g GB", static_cast<double>(bytes) / 1e9);
+  return text;
+}
+
 tl::expected<JobPlan, Problem> plan_job(const JobOrder& order, const VolumeFacts& volume,
                                         const PipelineLimits& limits) {
   if (const auto checked = check_isovalues(order, volume); !checked) return tl::unexpected(checked.error());
@@ -114,10 +125,12 @@ tl::expected<JobPlan, Problem> plan_job(const JobOrder& order, const VolumeFacts
   if (limits.max_memory_bytes > 0 && plan.memory_bytes > limits.max_memory_bytes) {
     return tl::unexpected(
         Problem{"job-too-large",
-                "The job needs more memory than this server lets one job take; crop or coarsen the "
-                "volume, or ask for a larger limit.",
+                "The job needs " + gigabytes(plan.memory_bytes) +
+                    " of memory, and this server lets one take " + gigabytes(limits.max_memory_bytes) +
+                    "; crop or coarsen the volume, ask for fewer isovalues, or for a larger limit.",
                 {{"estimate_bytes", plan.memory_bytes}, {"limit_bytes", limits.max_memory_bytes}}});
   }
+  plan.is_long = total_cost(parts, surfaces, voxels) > kSecondsOfShortJob;
   return plan;
 }
 

@@ -8,6 +8,7 @@
 #include "algorithms/surface/isosurface.h"
 #include "algorithms/surface/otsu.h"
 #include "algorithms/volume/parallel.h"
+#include "service/pipeline/costs.h"
 #include "service/pipeline/dicom_results.h"
 #include "service/pipeline/parts.h"
 #include "service/pipeline/reading.h"
@@ -18,20 +19,7 @@
 namespace volsmooth {
 namespace {
 
-/// Rough seconds per voxel on two cores, good enough to weigh the stages against each other in the progress.
-constexpr double kReadCost = 12e-9, kStepCost = 1.2e-9, kMeasureCost = 1e-9, kSurfaceCost = 20e-9,
-                 kWriteCost = 15e-9, kMeshWriteCost = 5e-9;
-
 const char* const kOriginal = "original";
-
-double total_cost(const std::vector<Part>& parts, double isovalues, double voxels) {
-  double cost = kReadCost + 2 * kMeasureCost + isovalues * kSurfaceCost / 2;
-  for (const Part& part : parts) {
-    cost +=
-        kStepCost * steps_of(part) + kMeasureCost + kWriteCost + isovalues * (kSurfaceCost + kMeshWriteCost);
-  }
-  return cost * voxels;
-}
 
 /// One job from the uploaded file to the finished results.
 class JobRun {
@@ -302,8 +290,9 @@ tl::expected<std::vector<Result>, Problem> run_job(const ComputeTask& task, cons
   } catch (const SurfaceTooLarge& surface) {
     return tl::unexpected(
         Problem{"job-too-large",
-                "A surface at one of the isovalues needs more memory than this server lets it take; "
-                "smooth more strongly, choose another isovalue, or crop the volume.",
+                "A surface at one of the isovalues needs " + gigabytes(surface.needed_bytes) +
+                    " of memory, and this server lets one take " + gigabytes(surface.limit) +
+                    "; smooth more strongly, choose another isovalue, or crop the volume.",
                 {{"estimate_bytes", surface.needed_bytes}, {"limit_bytes", surface.limit}}});
   }
   return outcome;

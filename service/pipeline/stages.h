@@ -18,4 +18,7 @@ tl::expected<JobPlan, Problem> plan_job(const JobOrder& order, const VolumeFacts
 tl::expected<std::vector<Result>, Problem> run_job(const ComputeTask& task, const StageProgress& report,
                                                    const PipelineLimits& limits);
 
+/// As a sentence says it: "11.6 GB".
+std::string gigabytes(std::int64_t bytes);
+
 }  // namespace volsmooth

@@ -228,7 +228,7 @@ TEST_F(JobServiceTest, CancelAndResultNeverBothHappen) {
 }
 
 TEST_F(JobServiceTest, JobsRunSideBySideAsFarAsMemoryGoes) {
-  open_and_start();  // two workers, 100 bytes
+  open_and_start();  // three workers, 100 bytes
   const auto volume = upload(*service_, "x").value();
   std::vector<std::string> ids;
   fake_.memory_bytes = 51;
@@ -243,6 +243,21 @@ TEST_F(JobServiceTest, JobsRunSideBySideAsFarAsMemoryGoes) {
   fake_.open_gate();
   for (const std::string& id : ids) wait_for(*service_, id);
   EXPECT_EQ(fake_.most_computing, 2);
+}
+
+TEST_F(JobServiceTest, AJobOfSecondsNeedNotWaitForLongOnes) {
+  open_and_start();
+  const auto volume = upload(*service_, "x").value();
+  std::vector<std::string> long_ones;
+  for (int i = 0; i < 3; ++i) long_ones.push_back(service_->submit(order_for(volume.id, "gate")).value().id);
+  while (fake_.at_gate < 2) std::this_thread::yield();
+  for (int i = 0; i < 2; ++i) {
+    const std::string id = service_->submit(order_for(volume.id)).value().id;
+    EXPECT_EQ(wait_for(*service_, id).state, JobState::kSucceeded);
+  }
+  EXPECT_EQ(service_->job(long_ones[2]).value().state, JobState::kQueued);
+  fake_.open_gate();
+  for (const std::string& id : long_ones) EXPECT_EQ(wait_for(*service_, id).state, JobState::kSucceeded);
 }
 
 TEST_F(JobServiceTest, AJobLargerThanTheLimitRunsAlone) {

@@ -82,6 +82,21 @@ TEST_F(JobStoreTest, ClaimsTheOldestAndNeverOneThatDoesNotFit) {
   EXPECT_FALSE(jobs_.claim(kAnyMemory));
 }
 
+TEST_F(JobStoreTest, WithoutLongOnesTheOldestOfTheOthersIsClaimed) {
+  Job lasting;
+  lasting.id = "j-1";
+  lasting.order.volume = "v-1";
+  lasting.is_long = true;
+  ASSERT_EQ(jobs_.insert(lasting, 1000), JobStore::Insertion::kDone);
+  add("j-2");
+  EXPECT_EQ(jobs_.claim(1, JobStore::Work::kCompute, false)->id, "j-2");
+  EXPECT_FALSE(jobs_.claim(1, JobStore::Work::kCompute, false));
+  const auto claimed = jobs_.claim(1);
+  ASSERT_TRUE(claimed);
+  EXPECT_EQ(claimed->id, "j-1");
+  EXPECT_TRUE(claimed->is_long);
+}
+
 TEST_F(JobStoreTest, ARequestedCancelWinsOverALaterResult) {
   add("j-1");
   jobs_.claim(kAnyMemory);
@@ -261,6 +276,7 @@ TEST(StoreDatabase, TakesOverWhatAnEarlierVersionWrote) {
         "WHERE state IN ('queued', 'running'); DROP TABLE delivered_instances; DROP TABLE deliveries; DROP "
         "TABLE arrivals; "
         "ALTER TABLE jobs DROP COLUMN not_before_ms; ALTER TABLE jobs DROP COLUMN source_tries; "
+        "ALTER TABLE jobs DROP COLUMN is_long; "
         "PRAGMA user_version = 1;");
   }
   StoreDatabase now(file);

@@ -104,7 +104,7 @@ struct FakeEngine {
     };
     engine.plan = [this](const JobOrder& order, const VolumeFacts&) -> tl::expected<JobPlan, Problem> {
       if (order.label == "plan at gate") wait_at_gate([](std::string_view, double) {});
-      return JobPlan{order.parameters, memory_bytes};
+      return JobPlan{order.parameters, memory_bytes, order.label == "gate"};
     };
     engine.compute = [this](const ComputeTask& task, const StageProgress& report) {
       return compute(task, report);

@@ -83,6 +83,12 @@ TEST(Plan, TheLargestVolumeAndASurfaceFitIntoTwelveGigabytes) {
   EXPECT_LT(plan->memory_bytes, 12'000'000'000);
 }
 
+TEST(Plan, TellsJobsOfSecondsFromLongOnes) {
+  EXPECT_FALSE(plan_job(order("compare", 1, {100, 200}), head(), {})->is_long);
+  EXPECT_TRUE(plan_job(order("mean-curvature-flow", 1, {300}), head(1024), {})->is_long);
+  EXPECT_TRUE(plan_job(order("mean-curvature-flow", 10'000), head(), {})->is_long);
+}
+
 TEST(Plan, AJobThatCostsTooMuchIsRefusedWithBothNumbers) {
   const auto plan = plan_job(order("mean-curvature-flow", 1e6), head(1024), {});
   ASSERT_FALSE(plan);
@@ -97,6 +103,7 @@ TEST(Plan, AJobThatNeedsTooMuchMemoryIsRefusedWithBothNumbers) {
   const auto plan = plan_job(order("mean-curvature-flow", 1), head(1024), limits);
   ASSERT_FALSE(plan);
   EXPECT_EQ(plan.error().slug, "job-too-large");
+  EXPECT_NE(plan.error().detail.find("this server lets one take 1.07 GB"), std::string::npos);
   EXPECT_GT(plan.error().members.at("estimate_bytes"), plan.error().members.at("limit_bytes"));
 }
 
