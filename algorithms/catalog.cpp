@@ -119,20 +119,40 @@ void resolve_sharpening(ParameterValues& resolved, const ParameterValues& asked,
       reach > 0 ? static_cast<double>(plan(Sharpening{reach}, input.grid).steps) : 0;
 }
 
+/// What a flow that chooses its time steps as it goes took. `steps` are what they stand for.
+ParameterValues as_values(const StepsTaken& taken) {
+  return {{"evaluations", static_cast<double>(taken.evaluations)},
+          {"explicit_steps", static_cast<double>(taken.explicit_steps)},
+          {"long_steps", static_cast<double>(taken.long_steps)},
+          {"rejected_steps", static_cast<double>(taken.rejected)},
+          {"displacement_voxels", taken.displacement_voxels}};
+}
+
+template <class Flow>
+ParameterValues smooth_and_tell(Volume& volume, const Flow& flow, const Progress& report) {
+  if constexpr (std::is_same_v<decltype(smooth(volume, flow, report)), StepsTaken>) {
+    return as_values(smooth(volume, flow, report));
+  } else {
+    smooth(volume, flow, report);
+    return {};
+  }
+}
+
 /// Runs `flow` on the volume, or on the density around its surface where one is named, which may be sharpened
 /// then.
 template <class Flow>
-void smooth_as_asked(Volume& volume, const Flow& flow, const ParameterValues& resolved,
-                     const Progress& report) {
-  if (!resolved.contains("surface")) return smooth(volume, flow, report);
+ParameterValues smooth_as_asked(Volume& volume, const Flow& flow, const ParameterValues& resolved,
+                                const Progress& report) {
+  if (!resolved.contains("surface")) return smooth_and_tell(volume, flow, report);
   const DensityWindow window{number(resolved, "surface"), number(resolved, "half_width")};
   const double steps = number(resolved, "steps"), sharpening_steps = number(resolved, "sharpening_steps", 0);
   const double flow_ends = 0.02 + 0.96 * steps / (steps + sharpening_steps);
   to_density(volume, window, part_of(report, 0, 0.02));
-  smooth(volume, flow, part_of(report, 0.02, flow_ends));
+  ParameterValues told = smooth_and_tell(volume, flow, part_of(report, 0.02, flow_ends));
   if (sharpening_steps > 0)
     smooth(volume, Sharpening{number(resolved, "sharpening_reach_mm")}, part_of(report, flow_ends, 0.98));
   to_intensity(volume, window, part_of(report, 0.98, 1));
+  return told;
 }
 
 // ---- rows
@@ -164,7 +184,26 @@ const Choices<MeanCurvatureScheme>& mean_curvature_schemes() {
 
 MeanCurvatureFlow mean_curvature_flow(const ParameterValues& resolved) {
   return {.flow_time_mm2 = number(resolved, "flow_time_mm2"),
-          .scheme = chosen(mean_curvature_schemes(), text(resolved, "scheme", "face-centred"))};
+          .scheme = chosen(mean_curvature_schemes(), text(resolved, "scheme", "face-centred")),
+          .tolerance_voxels = number(resolved, "tolerance_voxels", MeanCurvatureFlow{}.tolerance_voxels)};
+}
+
+/// The schemes of the thesis take short steps only.
+void resolve_scheme(ParameterValues& resolved, const ParameterValues& asked) {
+  if (asked.contains("scheme")) resolved["scheme"] = asked.at("scheme");
+  if (text(asked, "scheme", "face-centred") == "face-centred")
+    resolved["tolerance_voxels"] = number(asked, "tolerance_voxels", MeanCurvatureFlow{}.tolerance_voxels);
+}
+
+ParameterInfo tolerance_parameter() {
+  return {.name = "tolerance_voxels",
+          .description =
+              "How far a long time step of the face-centred scheme may displace isosurfaces (root mean "
+              "square, by its estimate), in units of the shortest spacing; 0: short steps only.",
+          .unit = "voxels",
+          .minimum = 0,
+          .maximum = 1,
+          .default_value = MeanCurvatureFlow{}.tolerance_voxels};
 }
 
 ConservativeMeanCurvatureFlow conservative_flow(const ParameterValues& resolved) {
@@ -173,6 +212,19 @@ ConservativeMeanCurvatureFlow conservative_flow(const ParameterValues& resolved)
 
 Laplacian laplacian(const ParameterValues& resolved) {
   return {.flow_time_mm2 = number(resolved, "flow_time_mm2")};
+}
+
+double bytes_of_one_volume(const ParameterValues&) {
+  return sizeof(float);
+}
+
+/// How many volumes a flow holds beside the one that flows.
+template <class Flow>
+double volumes_beside(const Flow& flow, double steps) {
+  if constexpr (std::is_same_v<Flow, MeanCurvatureFlow>) {
+    if (takes_long_steps(flow, static_cast<std::int64_t>(steps))) return kVolumesOfLongSteps;
+  }
+  return 1;
 }
 
 /// The row of a flow whose strength is its flow time.
@@ -185,7 +237,7 @@ Method flow_method(std::string name, std::string description, Parameters more,
           .resolve =
               [flow_of](const ParameterValues& asked, const MethodInput& input) {
                 ParameterValues resolved = resolve_strength(asked, input);
-                if (asked.contains("scheme")) resolved["scheme"] = asked.at("scheme");
+                if constexpr (std::is_same_v<Flow, MeanCurvatureFlow>) resolve_scheme(resolved, asked);
                 resolve_surface(resolved, asked, input);
                 if constexpr (std::is_same_v<Flow, ConservativeMeanCurvatureFlow>)
                   if (asked.contains("surface")) resolve_sharpening(resolved, asked, input);
@@ -196,9 +248,12 @@ Method flow_method(std::string name, std::string description, Parameters more,
               },
           .run =
               [flow_of](Volume& volume, const ParameterValues& resolved, const Progress& report) {
-                smooth_as_asked(volume, flow_of(resolved), resolved, report);
+                return smooth_as_asked(volume, flow_of(resolved), resolved, report);
               },
-          .extra_bytes_per_voxel = sizeof(float)};
+          .extra_bytes_per_voxel =
+              [flow_of](const ParameterValues& resolved) {
+                return sizeof(float) * volumes_beside(flow_of(resolved), number(resolved, "steps"));
+              }};
 }
 
 const Choices<Reconstruction>& offset_gains() {
@@ -247,9 +302,11 @@ Method offset_method() {
                 resolved["steps"] = static_cast<double>(steps.steps);
                 return resolved;
               },
-          .run = [](Volume& volume, const ParameterValues& resolved,
-                    const Progress& report) { smooth_as_asked(volume, offset(resolved), resolved, report); },
-          .extra_bytes_per_voxel = sizeof(float)};
+          .run =
+              [](Volume& volume, const ParameterValues& resolved, const Progress& report) {
+                return smooth_as_asked(volume, offset(resolved), resolved, report);
+              },
+          .extra_bytes_per_voxel = bytes_of_one_volume};
 }
 
 Sharpening sharpening(const ParameterValues& resolved) {
@@ -269,24 +326,25 @@ Method sharpening_method() {
                       .minimum = 1e-6,
                       .maximum = 2000,
                       .default_text = "three times the geometric mean of the spacing"};
-  return {
-      .info = {.name = "sharpening",
-               .description = "Gathers the isosurfaces around one of them and keeps the mass: blurred "
-                              "edges become steep, and its volume becomes what the mass says.",
-               .parameters = {std::move(surface), half_width_parameter(), std::move(reach)}},
-      .resolve =
-          [](const ParameterValues& asked, const MethodInput& input) {
-            ParameterValues resolved;
-            resolve_surface(resolved, asked, input);
-            resolved["reach_mm"] = number(asked, "reach_mm", 3 * mean_spacing(input.grid));
-            const SharpeningPlan steps = plan(sharpening(resolved), input.grid);
-            resolved["step_mm"] = steps.step_mm;
-            resolved["steps"] = static_cast<double>(steps.steps);
-            return resolved;
-          },
-      .run = [](Volume& volume, const ParameterValues& resolved,
-                const Progress& report) { smooth_as_asked(volume, sharpening(resolved), resolved, report); },
-      .extra_bytes_per_voxel = sizeof(float)};
+  return {.info = {.name = "sharpening",
+                   .description = "Gathers the isosurfaces around one of them and keeps the mass: blurred "
+                                  "edges become steep, and its volume becomes what the mass says.",
+                   .parameters = {std::move(surface), half_width_parameter(), std::move(reach)}},
+          .resolve =
+              [](const ParameterValues& asked, const MethodInput& input) {
+                ParameterValues resolved;
+                resolve_surface(resolved, asked, input);
+                resolved["reach_mm"] = number(asked, "reach_mm", 3 * mean_spacing(input.grid));
+                const SharpeningPlan steps = plan(sharpening(resolved), input.grid);
+                resolved["step_mm"] = steps.step_mm;
+                resolved["steps"] = static_cast<double>(steps.steps);
+                return resolved;
+              },
+          .run =
+              [](Volume& volume, const ParameterValues& resolved, const Progress& report) {
+                return smooth_as_asked(volume, sharpening(resolved), resolved, report);
+              },
+          .extra_bytes_per_voxel = bytes_of_one_volume};
 }
 
 std::vector<Method> make_catalog() {
@@ -299,7 +357,7 @@ std::vector<Method> make_catalog() {
                                     "order; 'thesis' is that of the method's source, of first order, and "
                                     "'thesis-weno' the same with gains of high order.",
                                     mean_curvature_schemes()),
-                   surface_parameter(), half_width_parameter()},
+                   tolerance_parameter(), surface_parameter(), half_width_parameter()},
                   mean_curvature_flow),
       flow_method("conservative-mean-curvature-flow",
                   "Mean curvature flow from which the mean speed is taken off, so that the mass of the "

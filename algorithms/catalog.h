@@ -23,11 +23,13 @@ struct Method {
   /// filled in from the input, `flow_time_mm2`, `feature_radius_mm`, `step_mm2`, `steps`.
   std::function<ParameterValues(const ParameterValues& asked, const MethodInput& input)> resolve = {};
 
-  /// Transforms `volume` in place; takes what `resolve` gave. Empty for a method that is made of `parts`.
-  std::function<void(Volume& volume, const ParameterValues& resolved, const Progress& report)> run = {};
+  /// Transforms `volume` in place; takes what `resolve` gave, and gives what only the run could tell. Empty
+  /// for a method that is made of `parts`.
+  std::function<ParameterValues(Volume& volume, const ParameterValues& resolved, const Progress& report)>
+      run = {};
 
-  /// Bytes held at the peak of `run` beyond the volume itself, per voxel.
-  double extra_bytes_per_voxel = 0;
+  /// Bytes held at the peak of `run` beyond the volume itself, per voxel; of what `resolve` gave.
+  std::function<double(const ParameterValues& resolved)> extra_bytes_per_voxel = {};
 };
 
 /// Every method that is offered, in the order of `GET /v1/methods`.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "algorithms/volume/large_pages.h"
 #include "algorithms/volume/parallel.h"
 
 namespace volsmooth {
@@ -52,23 +53,37 @@ void scale(std::span<float> voxels, float factor, const Progress& report, double
       report, fraction);
 }
 
-}  // namespace
-
-void take_steps(Volume& volume, std::int64_t steps, const ExplicitStep& step, const Progress& report) {
+void take_plain_steps(Volume& volume, std::int64_t steps, const ExplicitStep& step, const Progress& report) {
   const std::size_t count = voxels_of(volume).size();
-  const float factor = safe_scale(largest_magnitude(voxels_of(volume), report));
-  scale(voxels_of(volume), factor, report, 0);
-  auto next = Volume::PixelContainer::New();
-  next->Reserve(count);
+  Buffer next = buffer_of(count);
   for (std::int64_t taken = 0; taken < steps; ++taken) {
     const auto begin = static_cast<double>(taken), all = static_cast<double>(steps);
     step(voxels_of(volume), {next->GetBufferPointer(), count},
          part_of(report, begin / all, (begin + 1) / all));
-    Volume::PixelContainer::Pointer last = volume.GetPixelContainer();
+    Buffer last = volume.GetPixelContainer();
     volume.SetPixelContainer(next);
     next = last;
   }
+}
+
+}  // namespace
+
+Buffer buffer_of(std::size_t count) {
+  auto buffer = Volume::PixelContainer::New();
+  buffer->Reserve(count);
+  ask_for_large_pages(std::as_bytes(std::span(buffer->GetBufferPointer(), count)));
+  return buffer;
+}
+
+void scaled_safely(Volume& volume, const Progress& report, const std::function<void()>& body) {
+  const float factor = safe_scale(largest_magnitude(voxels_of(volume), report));
+  scale(voxels_of(volume), factor, report, 0);
+  body();
   scale(voxels_of(volume), 1 / factor, report, 1);
+}
+
+void take_steps(Volume& volume, std::int64_t steps, const ExplicitStep& step, const Progress& report) {
+  scaled_safely(volume, report, [&] { take_plain_steps(volume, steps, step, report); });
 }
 
 }  // namespace volsmooth

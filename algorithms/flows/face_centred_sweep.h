@@ -1,8 +1,9 @@
 #pragma once
 
+#include <functional>
 #include <span>
 
-#include "algorithms/flows/tiles.h"
+#include "algorithms/flows/stencil_sweep.h"
 #include "algorithms/progress.h"
 #include "algorithms/volume/geometry.h"
 #include "algorithms/volume/instruction_set.h"
@@ -17,5 +18,19 @@ void face_centred_step(std::span<const float> from, std::span<float> to, const G
 /// The same with a choice of what does not change the result.
 void face_centred_step(std::span<const float> from, std::span<float> to, const Grid& grid, double step_mm2,
                        InstructionSet set, const TileShape& shape, const Progress& report);
+
+/// How rows are swept that an explicit step has moved.
+struct MovedRowSweep {
+  InstructionSet set;
+  TileShape tile;
+  int outputs = 1;  ///< scratch rows of `StencilRow`, the first of which holds the moved row
+};
+
+using MovedRowBody = std::function<void(const StencilRow& row, const float* moved)>;
+
+/// Calls `body` for every row of `from` with what an explicit step makes of it, on all cores, in no
+/// particular order.
+void for_each_moved_row(std::span<const float> from, const Grid& grid, double step_mm2,
+                        const MovedRowSweep& sweep, const MovedRowBody& body, const Progress& report);
 
 }  // namespace volsmooth

@@ -7,7 +7,7 @@
 
 namespace volsmooth {
 
-float intensity_range(std::span<const float> voxels, const Progress& report) {
+IntensityEnds intensity_ends(std::span<const float> voxels, const Progress& report) {
   constexpr std::int64_t kChunk = 1 << 18;
   using Ends = std::ranges::min_max_result<float>;
   std::vector<Ends> of_chunks((voxels.size() - 1) / kChunk + 1);
@@ -18,7 +18,12 @@ float intensity_range(std::span<const float> voxels, const Progress& report) {
             voxels.subspan(static_cast<std::size_t>(begin), static_cast<std::size_t>(end - begin)));
       },
       [&](double) { report(0); });
-  return std::ranges::max(of_chunks, {}, &Ends::max).max - std::ranges::min(of_chunks, {}, &Ends::min).min;
+  return {std::ranges::min(of_chunks, {}, &Ends::min).min, std::ranges::max(of_chunks, {}, &Ends::max).max};
+}
+
+float intensity_range(std::span<const float> voxels, const Progress& report) {
+  const auto [lowest, highest] = intensity_ends(voxels, report);
+  return highest - lowest;
 }
 
 }  // namespace volsmooth

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "algorithms/flows/explicit_steps.h"
+#include "algorithms/flows/face_centred_stages.h"
 #include "algorithms/flows/face_centred_sweep.h"
 #include "algorithms/flows/intensity_range.h"
 #include "algorithms/flows/mean_curvature_sweep.h"
@@ -12,10 +13,14 @@
 namespace volsmooth {
 namespace {
 
+/// Up to these are taken as they are: the first of long ones would be explicit anyway.
+constexpr std::int64_t kFewSteps = 8;
+
 /// A fifth of h^2 on cubes. The flow diffuses in the two directions along a surface; a step of half the
 /// inverse sum of the two largest eigenvalues of G^-1, all that these can be, is the limit of stability.
+constexpr double kOfLimit = 0.8;
+
 double largest_face_centred_step(const Grid& grid) {
-  constexpr double kOfLimit = 0.8;
   return kOfLimit * 0.5 / sum_of_larger_eigenvalues(inverse(metric_of(grid)));
 }
 
@@ -43,6 +48,17 @@ ExplicitStep explicit_step(MeanCurvatureScheme scheme, const Grid& grid, double 
   };
 }
 
+StagedFlow staged_flow(const ExplicitStep& step, const Grid& grid, double step_mm2) {
+  return {.step = step,
+          .stiffness = 2 * kOfLimit * step_mm2 / largest_face_centred_step(grid),
+          .stage = [=](const Stage& stage, std::span<float> to,
+                       const Progress& report) { face_centred_stage(stage, to, grid, step_mm2, report); },
+          .judge =
+              [=](const LongStepResult& result, std::span<float> moved, const Progress& report) {
+                return judge_face_centred(result, moved, grid, step_mm2, report);
+              }};
+}
+
 }  // namespace
 
 StepPlan plan(const MeanCurvatureFlow& flow, const Grid& grid) {
@@ -51,10 +67,19 @@ StepPlan plan(const MeanCurvatureFlow& flow, const Grid& grid) {
                                             : largest_thesis_step(grid));
 }
 
-void smooth(Volume& volume, const MeanCurvatureFlow& flow, const Progress& report) {
+bool takes_long_steps(const MeanCurvatureFlow& flow, std::int64_t steps) {
+  return flow.scheme == MeanCurvatureScheme::kFaceCentred && flow.tolerance_voxels > 0 && steps > kFewSteps;
+}
+
+StepsTaken smooth(Volume& volume, const MeanCurvatureFlow& flow, const Progress& report) {
   const Grid grid = grid_of(volume);
   const StepPlan steps = plan(flow, grid);
-  take_steps(volume, steps.steps, explicit_step(flow.scheme, grid, steps.step_mm2), report);
+  const ExplicitStep step = explicit_step(flow.scheme, grid, steps.step_mm2);
+  if (takes_long_steps(flow, steps.steps))
+    return take_long_steps(volume, steps.steps, flow.tolerance_voxels,
+                           staged_flow(step, grid, steps.step_mm2), report);
+  take_steps(volume, steps.steps, step, report);
+  return {.explicit_steps = steps.steps, .evaluations = steps.steps};
 }
 
 }  // namespace volsmooth

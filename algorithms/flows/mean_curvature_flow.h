@@ -1,5 +1,6 @@
 #pragma once
 
+#include "algorithms/flows/long_steps.h"
 #include "algorithms/flows/step_plan.h"
 #include "algorithms/progress.h"
 #include "algorithms/volume/volume.h"
@@ -18,15 +19,24 @@ enum class MeanCurvatureScheme {
 struct MeanCurvatureFlow {
   double flow_time_mm2 = 1.0;  ///< a ball of radius R shrinks to sqrt(R^2 - 4 flow_time)
   MeanCurvatureScheme scheme = MeanCurvatureScheme::kFaceCentred;
+  /// How far a long step may displace isosurfaces, root mean square, by its estimate, from where the explicit
+  /// steps of `plan` would bring them. In units of the shortest spacing; face-centred only.
+  /// 0: none but explicit steps.
+  double tolerance_voxels = 0.03;
 };
 
-/// The stable steps `smooth` takes (README.md, "Stability").
+/// The stable explicit steps that make up the flow time (README.md, "Stability"). The face-centred scheme
+/// takes many at once where the tolerance allows (README.md, "Time integration").
 StepPlan plan(const MeanCurvatureFlow& flow, const Grid& grid);
+
+/// Whether so many steps of `plan` are taken many at once, which holds `kVolumesOfLongSteps` more volumes;
+/// else one.
+bool takes_long_steps(const MeanCurvatureFlow& flow, std::int64_t steps);
 
 /// Lets all isosurfaces of `volume` flow, on all cores of the current arena. No value leaves the input's
 /// range; the result does not depend on the number of threads. The volume's buffer may be another one
 /// afterwards: spans into it taken before are stale. When `report` throws, the intensities are left
 /// undefined.
-void smooth(Volume& volume, const MeanCurvatureFlow& flow, const Progress& report = no_progress);
+StepsTaken smooth(Volume& volume, const MeanCurvatureFlow& flow, const Progress& report = no_progress);
 
 }  // namespace volsmooth

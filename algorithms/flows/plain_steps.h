@@ -1,8 +1,10 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
 #include "algorithms/flows/grid_metric.h"
+#include "algorithms/flows/long_steps.h"
 #include "algorithms/flows/offset_sweep.h"
 #include "algorithms/flows/thesis_sweep.h"
 #include "algorithms/flows/upwind_metric.h"
@@ -112,6 +114,18 @@ void plain_face_centred_step(std::span<const Scalar> from, std::span<Scalar> to,
       return face_centred_moved<Scalar>(around, metric, time);
     });
   });
+}
+
+/// A stage of a long step of the same, held in range.
+template <class Scalar>
+void plain_face_centred_stage(const Stage& stage, std::span<Scalar> to, const Grid& grid, double step_mm2) {
+  std::vector<Scalar> moved(to.size());
+  plain_face_centred_step<Scalar>(stage.previous, moved, grid, step_mm2);
+  for (std::size_t i = 0; i < to.size(); ++i) {
+    const Scalar value = staged<Scalar>(
+        stage.weights, {stage.start[i], stage.start_moved[i], stage.before[i], stage.previous[i], moved[i]});
+    to[i] = std::min(std::max(value, stage.range.lowest), stage.range.highest);
+  }
 }
 
 /// rho_i + dt mu |grad rho|+ or, where mu < 0, |grad rho|- (thesis, Eq. 6.4), on any axes; as the second of

@@ -101,7 +101,8 @@ tl::expected<JobPlan, Problem> plan_job(const JobOrder& order, const VolumeFacts
   const std::vector<Part> parts = parts_of(order, plan.parameters, input);
   for (const Part& part : parts) {
     steps += steps_of(part);
-    extra_bytes_per_voxel = std::max(extra_bytes_per_voxel, part.method->extra_bytes_per_voxel);
+    extra_bytes_per_voxel =
+        std::max(extra_bytes_per_voxel, part.method->extra_bytes_per_voxel(part.parameters));
   }
   const double voxel_steps = voxels * steps;
   if (voxel_steps > limits.max_voxel_steps) {

@@ -28,7 +28,7 @@ std::int64_t peak_memory_bytes() {
 }
 
 ordered_json row(const FoliationRow& foliation) {
-  const auto& [method, parameters, before, after, written] = foliation;
+  const auto& [method, parameters, before, after, written, integration] = foliation;
   return {{"method", method},
           {"parameters", ordered_json(to_json(parameters))},
           {"mass", before_after(before.mass, after.mass)},
@@ -36,7 +36,8 @@ ordered_json row(const FoliationRow& foliation) {
           {"intensity_min", before_after(before.minimum, after.minimum)},
           {"intensity_max", before_after(before.maximum, after.maximum)},
           {"rounding_rms", written.rounding_rms},
-          {"clipped_voxels", written.clipped_voxels}};
+          {"clipped_voxels", written.clipped_voxels},
+          {"integration", ordered_json(to_json(integration))}};
 }
 
 ordered_json row(const SurfaceRow& surface) {

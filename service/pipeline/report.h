@@ -18,6 +18,7 @@ struct FoliationRow {
   ParameterValues parameters;  ///< resolved for this method
   FoliationMeasures before, after;
   WriteOutcome written;
+  ParameterValues integration;  ///< what the method's time steps were, where it chooses them as it goes
 };
 
 /// What one method did to one isosurface.

@@ -99,9 +99,10 @@ class JobRun {
     const std::string& name = part.method->info.name;
     const Volume::Pointer volume = volume_for(part);
     dicom_.begin_method(name, part.parameters);
-    FoliationRow foliation{name, part.parameters, original_foliation_, {}, {}};
-    clock_.run("flow", kStepCost * steps_of(part) * voxels_,
-               [&](const Progress& progress) { part.method->run(*volume, part.parameters, progress); });
+    FoliationRow foliation{name, part.parameters, original_foliation_, {}, {}, {}};
+    clock_.run("flow", kStepCost * steps_of(part) * voxels_, [&](const Progress& progress) {
+      foliation.integration = part.method->run(*volume, part.parameters, progress);
+    });
     clock_.run("flow", kMeasureCost * voxels_,
                [&](const Progress& progress) { foliation.after = measure(*volume, progress); });
 

@@ -205,6 +205,32 @@ TEST(Catalog, CountsTheStepsOfSharpening) {
   EXPECT_FALSE(method.resolve({}, kInput).contains("sharpening_steps"));
 }
 
+/// Beside the volume itself one more; three where many steps are taken at once.
+TEST(Catalog, TellsWhatMeanCurvatureFlowHoldsAndTook) {
+  const Method& method = *find_method("mean-curvature-flow");
+  const auto told = [&](const ParameterValues& asked) {
+    const auto resolved = method.resolve(asked, kInput);
+    auto volume = volume_of(kGrid, noise(kGrid.size, 1));
+    ParameterValues values = method.run(*volume, resolved, no_progress);
+    values["bytes"] = method.extra_bytes_per_voxel(resolved);
+    values["steps"] = resolved.at("steps");
+    return values;
+  };
+  const auto few = told({{"flow_time_mm2", 1.0}}), many = told({{"flow_time_mm2", 9.0}}),
+             one_by_one = told({{"flow_time_mm2", 9.0}, {"tolerance_voxels", 0.0}}),
+             of_thesis = told({{"flow_time_mm2", 9.0}, {"scheme", std::string("thesis")}});
+  EXPECT_EQ(number(few, "bytes"), 4);
+  EXPECT_EQ(number(many, "bytes"), 12);
+  EXPECT_EQ(number(one_by_one, "bytes"), 4);
+  EXPECT_EQ(number(of_thesis, "bytes"), 4);
+  for (const auto& values : {few, one_by_one, of_thesis}) {
+    EXPECT_EQ(number(values, "evaluations"), number(values, "steps"));
+    EXPECT_EQ(number(values, "long_steps"), 0);
+  }
+  EXPECT_LT(number(many, "evaluations"), 1.2 * number(many, "steps"));
+  EXPECT_EQ(find_method("offset")->extra_bytes_per_voxel({}), 4);
+}
+
 TEST(Catalog, RunsMeanCurvatureFlowUnderItsName) {
   auto by_name = volume_of(kGrid, noise(kGrid.size, 1)), directly = copy_of(*by_name);
   const Method& method = *find_method("mean-curvature-flow");

@@ -1,17 +1,22 @@
 // Seconds per explicit step on a 280^3 volume, each beside one iteration of itk::CurvatureFlowImageFilter and
-// one streaming copy in the same round: machines differ and are shared, ratios hold.
+// one streaming copy in the same round: machines differ and are shared, ratios hold. And seconds of processor
+// time from nested spheres on 128^3 to a flow time, beside ITK's, with the errors of both.
 #include <benchmark/benchmark.h>
 #include <itkCurvatureFlowImageFilter.h>
 #include <itkMultiThreaderBase.h>
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
+#include <ctime>
 #include <map>
 #include <string>
 #include <vector>
 
 #include "algorithms/flows/face_centred_sweep.h"
+#include "algorithms/flows/laplacian.h"
 #include "algorithms/flows/laplacian_sweep.h"
+#include "algorithms/flows/mean_curvature_flow.h"
 #include "algorithms/flows/mean_curvature_sweep.h"
 #include "algorithms/volume/parallel.h"
 #include "tests/support/phantoms.h"
@@ -56,13 +61,14 @@ void laplacian() {
 /// Several, so that what the filter does once a call does not count.
 constexpr unsigned kItkIterations = 3;
 
-void itk_curvature_flow(int threads) {
+Volume::Pointer itk_curvature_flow(Volume& volume, unsigned iterations, double step, int threads) {
   auto filter = itk::CurvatureFlowImageFilter<Volume, Volume>::New();
-  filter->SetInput(data().volume);
-  filter->SetNumberOfIterations(kItkIterations);
-  filter->SetTimeStep(kStep);
+  filter->SetInput(&volume);
+  filter->SetNumberOfIterations(iterations);
+  filter->SetTimeStep(step);
   filter->SetNumberOfWorkUnits(static_cast<itk::ThreadIdType>(threads));
   filter->Update();
+  return filter->GetOutput();
 }
 
 template <class Work>
@@ -70,6 +76,14 @@ double seconds(const Work& work) {
   const auto start = std::chrono::steady_clock::now();
   work();
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// Medians over the rounds.
+void count(benchmark::State& state, std::map<std::string, std::vector<double>>& rounds) {
+  for (auto& [name, values] : rounds) {
+    std::ranges::nth_element(values, values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2));
+    state.counters[name] = values[values.size() / 2];
+  }
 }
 
 /// A round times every contestant once; the counters are medians over the rounds of a ratio within a round.
@@ -84,7 +98,9 @@ void flow_steps(benchmark::State& state) {
       const double curvature = seconds(mean_curvature);
       const double default_curvature = seconds(face_centred);
       const double heat = seconds(laplacian);
-      const double itk = seconds([&] { itk_curvature_flow(threads); }) / kItkIterations;
+      const double itk =
+          seconds([&] { itk_curvature_flow(*data().volume, kItkIterations, kStep, threads); }) /
+          kItkIterations;
       state.SetIterationTime(curvature);
       rounds["copy_seconds"].push_back(streaming);
       rounds["mcf_seconds"].push_back(curvature);
@@ -97,13 +113,91 @@ void flow_steps(benchmark::State& state) {
       rounds["laplacian_over_copy"].push_back(heat / streaming);
     }
   });
-  for (auto& [name, values] : rounds) {
-    std::ranges::nth_element(values, values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2));
-    state.counters[name] = values[values.size() / 2];
-  }
+  count(state, rounds);
 }
 
 BENCHMARK(flow_steps)->Arg(1)->Arg(2)->ArgName("threads")->Iterations(7)->UseManualTime();
+
+// ---- time to a flow time ---------------------------------------------------------------------------------
+
+/// f(r) = (1 - tanh((r - 0.6)/0.25))/2 in [-1, 1]^3, on cubes of 1 mm.
+constexpr std::int64_t kSpheres = 128;
+const Grid kSpheresGrid{{kSpheres, kSpheres, kSpheres}, {1, 1, 1}};
+
+std::vector<float> spheres_at(double time) {
+  const auto profile = soft_step(0.3 * kSpheres, 0.125 * kSpheres);
+  return sampled(kSpheresGrid, nested_spheres(kSpheresGrid, [=](double r) {
+                   return profile(std::sqrt(r * r + 4 * time));
+                 }));
+}
+
+/// Root mean square where r < 0.85.
+double error_of_spheres(const Volume& volume, const std::vector<float>& exact) {
+  const Vector3 centre = centre_of(kSpheresGrid);
+  const auto values = voxels_of(volume);
+  double squares = 0, number = 0;
+  std::size_t voxel = 0;
+  for_each_voxel(kSpheresGrid, [&](const Size3&, const Vector3& position) {
+    const double off = double{values[voxel]} - double{exact[voxel]};
+    ++voxel;
+    if (distance(position, centre) > 0.425 * kSpheres) return;
+    squares += off * off;
+    number += 1;
+  });
+  return std::sqrt(squares / number);
+}
+
+/// Of all threads: on a shared machine the clock on the wall tells of others.
+template <class Work>
+double processor_seconds(const Work& work) {
+  const std::clock_t start = std::clock();
+  work();
+  return static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
+}
+
+constexpr double kItkStep = 0.125;
+
+/// ITK's result, for its error; computed once. Its time in a round is that of eight iterations, times as many
+/// as it takes.
+double itk_error(double time, const std::vector<float>& before, const std::vector<float>& exact) {
+  const auto iterations = static_cast<unsigned>(std::lround(time / kItkStep));
+  return error_of_spheres(*itk_curvature_flow(*volume_of(kSpheresGrid, before), iterations, kItkStep, 1),
+                          exact);
+}
+
+void time_to_result(benchmark::State& state) {
+  constexpr unsigned kTimedIterations = 8;
+  const auto time = static_cast<double>(state.range(0));
+  itk::MultiThreaderBase::SetGlobalMaximumNumberOfThreads(1);
+  std::map<std::string, std::vector<double>> rounds;
+  with_threads(1, [&] {
+    const std::vector<float> before = spheres_at(0), exact = spheres_at(time);
+    state.counters["itk_error"] = itk_error(time, before, exact);
+    for ([[maybe_unused]] auto round : state) {
+      auto volume = volume_of(kSpheresGrid, before), stepwise = volume_of(kSpheresGrid, before);
+      auto heated = volume_of(kSpheresGrid, before), given = volume_of(kSpheresGrid, before);
+      const double itk =
+          processor_seconds([&] { itk_curvature_flow(*given, kTimedIterations, kItkStep, 1); }) * time /
+          kItkStep / kTimedIterations;
+      StepsTaken taken;
+      const double flow = processor_seconds([&] { taken = smooth(*volume, MeanCurvatureFlow{time}); });
+      const double explicit_flow = processor_seconds(
+          [&] { smooth(*stepwise, MeanCurvatureFlow{.flow_time_mm2 = time, .tolerance_voxels = 0}); });
+      const double heat = processor_seconds([&] { smooth(*heated, Laplacian{time}); });
+      state.SetIterationTime(flow);
+      rounds["flow_seconds"].push_back(flow);
+      rounds["itk_over_flow"].push_back(itk / flow);
+      rounds["itk_over_explicit"].push_back(itk / explicit_flow);
+      rounds["itk_over_heat"].push_back(itk / heat);
+      state.counters["error"] = error_of_spheres(*volume, exact);
+      state.counters["explicit_error"] = error_of_spheres(*stepwise, exact);
+      state.counters["evaluations"] = static_cast<double>(taken.evaluations);
+    }
+  });
+  count(state, rounds);
+}
+
+BENCHMARK(time_to_result)->Arg(1)->Arg(10)->Arg(100)->ArgName("flow_time")->Iterations(5)->UseManualTime();
 
 }  // namespace
 }  // namespace volsmooth

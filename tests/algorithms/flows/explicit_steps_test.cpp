@@ -25,6 +25,8 @@ struct Case {
 const Case kCases[] = {
     {"MeanCurvatureFlow",
      [](Volume& volume, const Progress& report) { smooth(volume, MeanCurvatureFlow{0.5}, report); }},
+    {"LongMeanCurvatureFlow",
+     [](Volume& volume, const Progress& report) { smooth(volume, MeanCurvatureFlow{8}, report); }},
     {"ConservativeMeanCurvatureFlow",
      [](Volume& volume, const Progress& report) {
        smooth(volume, ConservativeMeanCurvatureFlow{0.5}, report);

@@ -18,6 +18,14 @@ std::vector<float> smoothed(const Grid& grid, const std::vector<float>& values, 
   return values_of(*volume);
 }
 
+/// By explicit steps alone.
+std::vector<float> smoothed_explicitly(const Grid& grid, const std::vector<float>& values,
+                                       double flow_time_mm2) {
+  auto volume = volume_of(grid, values);
+  smooth(*volume, MeanCurvatureFlow{.flow_time_mm2 = flow_time_mm2, .tolerance_voxels = 0});
+  return values_of(*volume);
+}
+
 double step_of(const Grid& grid) {
   return plan(MeanCurvatureFlow{1e15}, grid).step_mm2;
 }
@@ -52,7 +60,7 @@ double spheres_error(double h) {
   constexpr double kTime = 0.04;
   const Grid grid = grid_over({h, h, h}, 1);
   const auto f = soft_step(0.6, 0.25);
-  const auto out = smoothed(grid, sampled(grid, octant_of_spheres(grid, f)), kTime);
+  const auto out = smoothed_explicitly(grid, sampled(grid, octant_of_spheres(grid, f)), kTime);
   const auto exact = octant_of_spheres(grid, [&](double r) { return f(std::sqrt(r * r + 4 * kTime)); });
   const auto radius = octant_of_spheres(grid, [](double r) { return r; });
   return rms_error(grid, out, exact, [&](const Vector3& x) { return radius(x) < 0.6; });
@@ -224,7 +232,7 @@ TEST(FaceCentredFlow, NeverLeavesTheRangeOnNoise) {
     auto before = noise(grid.size, seed, -1, 1);
     if (seed % 3 == 1)
       for (float& value : before) value = std::copysign(1.0F, value);
-    const auto after = smoothed(grid, before, 10 * step_of(grid));
+    const auto after = smoothed(grid, before, 30 * step_of(grid));
     ASSERT_GE(std::ranges::min(after), std::ranges::min(before)) << "seed " << seed;
     ASSERT_LE(std::ranges::max(after), std::ranges::max(before)) << "seed " << seed;
   }

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "algorithms/flows/face_centred_stages.h"
 #include "algorithms/flows/face_centred_sweep.h"
 #include "algorithms/flows/laplacian_sweep.h"
 #include "algorithms/flows/mean_curvature_sweep.h"
@@ -50,6 +51,37 @@ Flow offset_flow(const char* name) {
           }};
 }
 
+/// A stage between volumes of noise, and what stands in `to`.
+Stage noisy_stage(std::span<const float> from, std::span<const float> to,
+                  const std::array<std::vector<float>, 2>& others) {
+  return {.weights = {.start = 0.3F,
+                      .start_moved = -0.7F,
+                      .before = -0.9F,
+                      .previous = 1.1F,
+                      .previous_moved = 1.2F},
+          .start = others[0],
+          .start_moved = others[1],
+          .before = to,
+          .previous = from,
+          .range = {-700, 900}};
+}
+
+std::array<std::vector<float>, 2> two_noises(const Grid& grid) {
+  return {noise(grid.size, 3, -1000, 1000), noise(grid.size, 4, -1000, 1000)};
+}
+
+const Flow kFaceCentredStage{
+    "FaceCentredStage",
+    [](std::span<const float> from, std::span<float> to, const Grid& grid, double step_mm2) {
+      const auto others = two_noises(grid);
+      plain_face_centred_stage(noisy_stage(from, to, others), to, grid, step_mm2);
+    },
+    [](std::span<const float> from, std::span<float> to, const Grid& grid, double step_mm2,
+       InstructionSet set, const TileShape& tile, const Progress& report) {
+      const auto others = two_noises(grid);
+      face_centred_stage(noisy_stage(from, to, others), to, grid, step_mm2, set, tile, report);
+    }};
+
 template <Reconstruction kGains>
 Flow thesis_flow(const char* name) {
   return {name,
@@ -68,6 +100,7 @@ using enum UpwindGradient;
 
 const Flow kFlows[] = {{"MeanCurvature", plain_mean_curvature_step<float>, mean_curvature_step},
                        {"FaceCentred", plain_face_centred_step<float>, face_centred_step},
+                       kFaceCentredStage,
                        {"Laplacian", plain_laplacian_step<float>, laplacian_step},
                        offset_flow<kPiecewiseConstant, kGodunov>("OffsetConstant"),
                        offset_flow<kPiecewiseConstant, kEngquistOsher>("OffsetConstantBothSides"),

@@ -27,9 +27,10 @@ Flowed in_band(const Grid& grid, const std::vector<float>& density, const Surfac
   return {values_of(*volume), result};
 }
 
+/// By explicit steps, as in the band.
 std::vector<float> everywhere(const Grid& grid, const std::vector<float>& density, double flow_time_mm2) {
   auto volume = volume_of(grid, density);
-  smooth(*volume, MeanCurvatureFlow{flow_time_mm2});
+  smooth(*volume, MeanCurvatureFlow{.flow_time_mm2 = flow_time_mm2, .tolerance_voxels = 0});
   return values_of(*volume);
 }
 
