@@ -1,8 +1,8 @@
 #include "algorithms/formats/gzip_header.h"
 
-#include <isa-l/crc.h>
-
 #include <vector>
+
+#include "algorithms/formats/isal.h"
 
 namespace volsmooth {
 namespace {
@@ -50,7 +50,7 @@ class HeaderBytes {
     if (!refusal_ && !good) refusal_ = {"gzip-corrupt", "A gzip member's header is not valid."};
   }
 
-  unsigned crc16() const { return crc32_gzip_refl(0, taken_.data(), taken_.size()) & 0xffff; }
+  unsigned crc16() const { return isal::crc32(0, std::as_bytes(std::span(taken_))) & 0xffff; }
 
   const std::optional<Refusal>& refusal() const { return refusal_; }
 

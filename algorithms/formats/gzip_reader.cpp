@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "algorithms/formats/gzip_header.h"
+#include "algorithms/formats/isal.h"
 
 namespace volsmooth {
 
@@ -56,7 +57,7 @@ tl::expected<std::size_t, Refusal> GzipReader::inflate(std::span<std::byte> out)
   state_->avail_in = static_cast<std::uint32_t>(in.size());
   state_->next_out = reinterpret_cast<std::uint8_t*>(out.data());
   state_->avail_out = static_cast<std::uint32_t>(room);
-  if (isal_inflate(state_.get()) != ISAL_DECOMP_OK) {
+  if (isal::inflate(*state_) != ISAL_DECOMP_OK) {
     return refuse("gzip-corrupt", "The gzip data is damaged or its checksum or length does not match.");
   }
   const std::size_t consumed = in.size() - state_->avail_in, made = room - state_->avail_out;

@@ -1,8 +1,5 @@
 #include "algorithms/formats/gzip_writer.h"
 
-#include <isa-l/crc.h>
-#include <isa-l/igzip_lib.h>
-
 #include <algorithm>
 #include <array>
 #include <memory>
@@ -10,6 +7,7 @@
 #include <vector>
 
 #include "algorithms/formats/buffered_file.h"
+#include "algorithms/formats/isal.h"
 #include "algorithms/volume/parallel.h"
 
 namespace volsmooth {
@@ -37,7 +35,7 @@ class BlockDeflater {
     stream_->avail_in = static_cast<std::uint32_t>(block.size());
     stream_->next_out = reinterpret_cast<std::uint8_t*>(out.data());
     stream_->avail_out = static_cast<std::uint32_t>(out.size());
-    if (isal_deflate(stream_.get()) != COMP_OK || stream_->avail_in != 0 || stream_->avail_out == 0) {
+    if (isal::deflate(*stream_) != COMP_OK || stream_->avail_in != 0 || stream_->avail_out == 0) {
       throw std::logic_error("a deflated block is larger than it can be");
     }
     out.resize(stream_->total_out);
@@ -72,8 +70,7 @@ void write_gzip(const std::filesystem::path& path, std::int64_t size, std::int64
     });
     const auto filled = static_cast<std::size_t>((end - begin + block_bytes - 1) / block_bytes);
     for (const Block& block : std::span(blocks).first(filled)) {
-      crc = crc32_gzip_refl(crc, reinterpret_cast<const unsigned char*>(block.plain.data()),
-                            block.plain.size());
+      crc = isal::crc32(crc, block.plain);
       file.bytes(block.deflated.data(), block.deflated.size());
     }
     report(static_cast<double>(end) / static_cast<double>(size));

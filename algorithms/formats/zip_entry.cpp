@@ -1,11 +1,10 @@
 #include "algorithms/formats/zip_entry.h"
 
-#include <isa-l/crc.h>
-#include <isa-l/igzip_lib.h>
-
 #include <algorithm>
 #include <limits>
 #include <memory>
+
+#include "algorithms/formats/isal.h"
 
 namespace volsmooth {
 namespace {
@@ -22,7 +21,7 @@ bool inflate(std::span<const std::byte> packed, std::span<std::byte> out) {
     const std::size_t in = std::min(in_left, kMostAtOnce), room = std::min(out_left, kMostAtOnce);
     state->avail_in = static_cast<std::uint32_t>(in);
     state->avail_out = static_cast<std::uint32_t>(room);
-    if (isal_inflate(state.get()) != ISAL_DECOMP_OK) return false;
+    if (isal::inflate(*state) != ISAL_DECOMP_OK) return false;
     const std::size_t consumed = in - state->avail_in, made = room - state->avail_out;
     in_left -= consumed;
     out_left -= made;
@@ -46,7 +45,7 @@ tl::expected<std::vector<std::byte>, Refusal> unpack(std::span<const std::byte> 
   } else {
     content.assign(packed.begin(), packed.end());
   }
-  if (crc32_gzip_refl(0, reinterpret_cast<const unsigned char*>(content.data()), content.size()) != entry.crc)
+  if (isal::crc32(0, content) != entry.crc)
     return refuse("zip-corrupt", "An entry of the zip archive does not have the checksum that it says.");
   return content;
 }

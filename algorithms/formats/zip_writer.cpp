@@ -1,12 +1,10 @@
 #include "algorithms/formats/zip_writer.h"
 
-#include <isa-l/crc.h>
-#include <isa-l/igzip_lib.h>
-
 #include <limits>
 #include <memory>
 #include <stdexcept>
 
+#include "algorithms/formats/isal.h"
 #include "algorithms/formats/zip_records.h"
 
 namespace volsmooth {
@@ -29,7 +27,7 @@ std::vector<std::byte> deflated(std::span<const std::byte> content) {
   stream.avail_in = static_cast<std::uint32_t>(content.size());
   stream.next_out = reinterpret_cast<std::uint8_t*>(out.data());
   stream.avail_out = static_cast<std::uint32_t>(out.size());
-  if (isal_deflate_stateless(&stream) != COMP_OK || stream.avail_in != 0)
+  if (isal::deflate_stateless(stream) != COMP_OK || stream.avail_in != 0)
     throw std::logic_error("a deflated file is larger than it can be");
   out.resize(stream.total_out);
   return out;
@@ -40,8 +38,7 @@ std::vector<std::byte> deflated(std::span<const std::byte> content) {
 PackedFile pack(std::span<const std::byte> content) {
   constexpr std::size_t kMost = std::numeric_limits<std::uint32_t>::max() / 1001 * 1000 - 1024;
   if (content.size() > kMost) throw std::logic_error("a file of 4 GiB for an archive");
-  return {deflated(content), content.size(),
-          crc32_gzip_refl(0, reinterpret_cast<const unsigned char*>(content.data()), content.size())};
+  return {deflated(content), content.size(), isal::crc32(0, content)};
 }
 
 void ZipWriter::add(const std::string& name, const PackedFile& file) {

@@ -1,7 +1,5 @@
 #include "algorithms/formats/dicom/uploaded_files.h"
 
-#include <isa-l/igzip_lib.h>
-
 #include <algorithm>
 #include <memory>
 #include <string_view>
@@ -9,6 +7,7 @@
 #include "algorithms/formats/dicom/elements.h"
 #include "algorithms/formats/dicom/refused.h"
 #include "algorithms/formats/dicom_upload.h"
+#include "algorithms/formats/isal.h"
 #include "algorithms/formats/multipart_body.h"
 #include "algorithms/formats/zip_entry.h"
 
@@ -50,7 +49,7 @@ void inflate(std::span<const std::byte> deflated, const ReadLimits& limits, std:
     out.resize(at + kInflatedAtOnce);
     state->next_out = reinterpret_cast<std::uint8_t*>(out.data() + at);
     state->avail_out = kInflatedAtOnce;
-    const bool broken = isal_inflate(state.get()) != ISAL_DECOMP_OK;
+    const bool broken = isal::inflate(*state) != ISAL_DECOMP_OK;
     out.resize(at + (kInflatedAtOnce - state->avail_out));
     if (broken) refuse_dicom("dicom-decode-failed", "The deflated data set of a file is damaged.");
     if (out.size() == at && state->block_state != ISAL_BLOCK_FINISH)
