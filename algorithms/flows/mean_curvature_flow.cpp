@@ -13,8 +13,8 @@
 namespace volsmooth {
 namespace {
 
-/// Up to these are taken as they are: the first of long ones would be explicit anyway.
-constexpr std::int64_t kFewSteps = 8;
+/// Up to these are taken one by one anyway: the first are, and what is left is too little for a long step.
+constexpr std::int64_t kFewSteps = 10;
 
 /// A fifth of h^2 on cubes. The flow diffuses in the two directions along a surface; a step of half the
 /// inverse sum of the two largest eigenvalues of G^-1, all that these can be, is the limit of stability.
