@@ -55,6 +55,9 @@ MCF step, scheme of the thesis / ITK CurvatureFlow, 1 thread|of("flow_steps/thre
 MCF step, scheme of the thesis / ITK CurvatureFlow, 2 threads|of("flow_steps/threads:2"; "itk_over_mcf")|1/35|1/60
 MCF step, default scheme / ITK CurvatureFlow, 1 thread|of("flow_steps/threads:1"; "itk_over_face_centred")|1/35|1/60
 MCF step, default scheme / ITK CurvatureFlow, 2 threads|of("flow_steps/threads:2"; "itk_over_face_centred")|1/35|1/60
+MCF to T = 1 h^2, at a smaller error / ITK CurvatureFlow|of("time_to_result/flow_time:1/"; "itk_over_flow")|1/40|1/80
+MCF to T = 10 h^2, at a smaller error / ITK CurvatureFlow|of("time_to_result/flow_time:10/"; "itk_over_flow")|1/100|1/200
+MCF to T = 100 h^2, at a smaller error / ITK CurvatureFlow|of("time_to_result/flow_time:100/"; "itk_over_flow")|1/300|1/1000
 MCF step, scheme of the thesis / streaming copy, 1 thread|of("flow_steps/threads:1"; "mcf_over_copy")|5|3
 MCF step, scheme of the thesis / streaming copy, 2 threads|of("flow_steps/threads:2"; "mcf_over_copy")|4|3
 Laplacian step / streaming copy, 1 thread|of("flow_steps/threads:1"; "laplacian_over_copy")|1.5|1.2
