@@ -185,7 +185,7 @@ const Choices<MeanCurvatureScheme>& mean_curvature_schemes() {
 MeanCurvatureFlow mean_curvature_flow(const ParameterValues& resolved) {
   return {.flow_time_mm2 = number(resolved, "flow_time_mm2"),
           .scheme = chosen(mean_curvature_schemes(), text(resolved, "scheme", "face-centred")),
-          .tolerance_voxels = number(resolved, "tolerance_voxels", MeanCurvatureFlow{}.tolerance_voxels)};
+          .tolerance_voxels = number(resolved, "tolerance_voxels", 0)};
 }
 
 /// The schemes of the thesis take short steps only.
@@ -212,6 +212,10 @@ ConservativeMeanCurvatureFlow conservative_flow(const ParameterValues& resolved)
 
 Laplacian laplacian(const ParameterValues& resolved) {
   return {.flow_time_mm2 = number(resolved, "flow_time_mm2")};
+}
+
+double counted_steps(const ParameterValues& resolved, const Grid&) {
+  return number(resolved, "steps");
 }
 
 double bytes_of_one_volume(const ParameterValues&) {
@@ -249,6 +253,13 @@ Method flow_method(std::string name, std::string description, Parameters more,
           .run =
               [flow_of](Volume& volume, const ParameterValues& resolved, const Progress& report) {
                 return smooth_as_asked(volume, flow_of(resolved), resolved, report);
+              },
+          .passes =
+              [flow_of](const ParameterValues& resolved, const Grid& grid) {
+                const Flow flow = flow_of(resolved);
+                const double after = number(resolved, "sharpening_steps", 0);
+                if constexpr (requires { passes(flow, grid); }) return passes(flow, grid) + after;
+                return static_cast<double>(plan(flow, grid).steps) + after;
               },
           .extra_bytes_per_voxel =
               [flow_of](const ParameterValues& resolved) {
@@ -306,6 +317,7 @@ Method offset_method() {
               [](Volume& volume, const ParameterValues& resolved, const Progress& report) {
                 return smooth_as_asked(volume, offset(resolved), resolved, report);
               },
+          .passes = counted_steps,
           .extra_bytes_per_voxel = bytes_of_one_volume};
 }
 
@@ -344,6 +356,7 @@ Method sharpening_method() {
               [](Volume& volume, const ParameterValues& resolved, const Progress& report) {
                 return smooth_as_asked(volume, sharpening(resolved), resolved, report);
               },
+          .passes = counted_steps,
           .extra_bytes_per_voxel = bytes_of_one_volume};
 }
 
@@ -371,7 +384,7 @@ std::vector<Method> make_catalog() {
       {.info = {.name = "compare",
                 .description = "Mean curvature flow and Laplacian of the same strength side by side, "
                                "with the surfaces of the original beside them.",
-                .parameters = strength_parameters(),
+                .parameters = joined(strength_parameters(), {tolerance_parameter()}),
                 .parts = {"mean-curvature-flow", "laplacian"}},
        .resolve = resolve_strength},
       offset_method(),

@@ -28,6 +28,9 @@ struct Method {
   std::function<ParameterValues(Volume& volume, const ParameterValues& resolved, const Progress& report)>
       run = {};
 
+  /// What `run` costs, about, in explicit steps over the volume; of what `resolve` gave.
+  std::function<double(const ParameterValues& resolved, const Grid& grid)> passes = {};
+
   /// Bytes held at the peak of `run` beyond the volume itself, per voxel; of what `resolve` gave.
   std::function<double(const ParameterValues& resolved)> extra_bytes_per_voxel = {};
 };

@@ -45,7 +45,11 @@ VOLSMOOTH_FORMULA void sum_row(const KernelRow& around) {
     row.out[x] = std::min(std::max(row.out[x], row.range.lowest), row.range.highest);
 }
 
-constexpr std::int64_t kColumns = 64;  ///< that are convolved side by side
+/// That are convolved side by side: 64, fewer of lines so long that these would leave the cache.
+std::int64_t columns_for(std::int64_t padded_length) {
+  constexpr std::int64_t kMostFloats = std::int64_t{1} << 18;
+  return std::clamp<std::int64_t>(kMostFloats / padded_length / 16 * 16, 16, 64);
+}
 
 /// All lines of a volume along one axis, in bundles that lie side by side along x.
 class Lines {
@@ -57,22 +61,23 @@ class Lines {
         width_(size[0]),
         length_(size[kernel.axis]),
         stride_(kernel.axis == 1 ? size[0] : size[0] * size[1]),
-        across_((size[0] + kColumns - 1) / kColumns),
+        columns_(columns_for(length_ + 2 * std::ssize(kernel.weights))),
+        across_((size[0] + columns_ - 1) / columns_),
         slices_(kernel.axis == 1 ? size[2] : size[1]),
         slice_stride_(kernel.axis == 1 ? size[0] * size[1] : size[0]) {}
 
   std::int64_t bundles() const { return across_ * slices_; }
 
   void convolve(std::int64_t bundle) const {
-    const std::int64_t x = bundle % across_ * kColumns, columns = std::min(kColumns, width_ - x);
+    const std::int64_t x = bundle % across_ * columns_, columns = std::min(columns_, width_ - x);
     float* first = voxels_.data() + bundle / across_ * slice_stride_ + x;
     const std::int64_t reach = std::ssize(kernel_.weights) - 1;
-    std::vector<float> lines(static_cast<std::size_t>((length_ + 2 * reach) * kColumns));
+    std::vector<float> lines(static_cast<std::size_t>((length_ + 2 * reach) * columns_));
     for (std::int64_t i = -reach; i < length_ + reach; ++i)
       std::copy_n(first + reflected(i, length_) * stride_, columns,
-                  &lines[static_cast<std::size_t>((i + reach) * kColumns)]);
+                  &lines[static_cast<std::size_t>((i + reach) * columns_)]);
     for (std::int64_t i = 0; i < length_; ++i)
-      sum_({columns, kColumns, &lines[static_cast<std::size_t>((i + reach) * kColumns)], kernel_.weights,
+      sum_({columns, columns_, &lines[static_cast<std::size_t>((i + reach) * columns_)], kernel_.weights,
             kernel_.range, first + i * stride_});
   }
 
@@ -80,7 +85,7 @@ class Lines {
   std::span<float> voxels_;
   const LineKernel& kernel_;
   RowKernel<KernelRow> sum_;
-  std::int64_t width_, length_, stride_, across_, slices_, slice_stride_;
+  std::int64_t width_, length_, stride_, columns_, across_, slices_, slice_stride_;
 };
 
 /// Along x, one after the other.
@@ -122,7 +127,9 @@ void convolve_lines(std::span<float> voxels, const Size3& size, const LineKernel
 }
 
 std::vector<float> heat_weights(double time, std::int64_t count) {
-  const std::vector<double> kernel = folded(heat_kernel(time), count);
+  // Much earlier than this, two mirrors have made every line even.
+  const double even = 4 * static_cast<double>(count) * static_cast<double>(count);
+  const std::vector<double> kernel = folded(heat_kernel(std::min(time, even)), count);
   std::vector<float> weights(kernel.begin(), kernel.end());
   double others = 0;
   for (std::size_t k = 1; k < weights.size(); ++k) others += 2 * double{weights[k]};

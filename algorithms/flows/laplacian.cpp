@@ -1,5 +1,8 @@
 #include "algorithms/flows/laplacian.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "algorithms/flows/explicit_steps.h"
 #include "algorithms/flows/heat_lines.h"
 #include "algorithms/flows/laplacian_sweep.h"
@@ -39,6 +42,18 @@ void convolve_along_axes(Volume& volume, const Grid& grid, double flow_time_mm2,
 StepPlan plan(const Laplacian& flow, const Grid& grid) {
   const StepPlan steps = explicit_plan(flow, grid);
   return is_separable(steps, grid) ? StepPlan{.step_mm2 = flow.flow_time_mm2, .steps = 1} : steps;
+}
+
+double passes(const Laplacian& flow, const Grid& grid) {
+  const StepPlan steps = explicit_plan(flow, grid);
+  if (!is_separable(steps, grid)) return static_cast<double>(steps.steps);
+  constexpr double kOfAxis = 2, kOfWeight = 0.1, kReach = 6;  // of standard deviations
+  double sum = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double reach = kReach * std::sqrt(2 * flow.flow_time_mm2) / grid.spacing_mm[axis];
+    sum += kOfAxis + kOfWeight * std::min(reach, static_cast<double>(grid.size[axis]));
+  }
+  return sum;
 }
 
 void smooth(Volume& volume, const Laplacian& flow, const Progress& report) {

@@ -14,6 +14,9 @@ struct Laplacian {
 
 StepPlan plan(const Laplacian& flow, const Grid& grid);
 
+/// About what it costs, in explicit steps of mean curvature flow over the volume.
+double passes(const Laplacian& flow, const Grid& grid);
+
 /// As `smooth(Volume&, const MeanCurvatureFlow&)`; mass is kept to rounding.
 void smooth(Volume& volume, const Laplacian& flow, const Progress& report = no_progress);
 

@@ -86,7 +86,7 @@ class Run {
   /// No longer than what is left or what stages can stand for; and where little would be left, half of it.
   std::int64_t fitted(std::int64_t length) const {
     const std::int64_t left = steps_ - done_;
-    if (length < left && 5 * length > 3 * left) length = (left + 1) / 2;
+    if (length < left && 5 * length > 3 * left) length = std::max((left + 1) / 2, kLeastLength);
     return std::min({length, left, most_steps_.back()});
   }
 

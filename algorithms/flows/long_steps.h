@@ -44,7 +44,7 @@ struct StepsTaken {
 inline constexpr int kVolumesOfLongSteps = 3;
 
 /// Comes to what `steps` explicit steps come to, by long ones as far as each displaces isosurfaces by no more
-/// than `tolerance_voxels` by its estimate, and within the range of `volume`. /// Deterministic. Spans into
+/// than `tolerance_voxels` by its estimate, and within the range of `volume`. Deterministic. Spans into
 /// the volume taken before are stale after.
 StepsTaken take_long_steps(Volume& volume, std::int64_t steps, double tolerance_voxels,
                            const StagedFlow& flow, const Progress& report);

@@ -71,6 +71,13 @@ bool takes_long_steps(const MeanCurvatureFlow& flow, std::int64_t steps) {
   return flow.scheme == MeanCurvatureScheme::kFaceCentred && flow.tolerance_voxels > 0 && steps > kFewSteps;
 }
 
+double passes(const MeanCurvatureFlow& flow, const Grid& grid) {
+  constexpr std::int64_t kStepsPerPass = 5;
+  const std::int64_t steps = plan(flow, grid).steps;
+  if (!takes_long_steps(flow, steps)) return static_cast<double>(steps);
+  return static_cast<double>(kFewSteps + (steps - kFewSteps) / kStepsPerPass);
+}
+
 StepsTaken smooth(Volume& volume, const MeanCurvatureFlow& flow, const Progress& report) {
   const Grid grid = grid_of(volume);
   const StepPlan steps = plan(flow, grid);

@@ -33,6 +33,9 @@ StepPlan plan(const MeanCurvatureFlow& flow, const Grid& grid);
 /// else one.
 bool takes_long_steps(const MeanCurvatureFlow& flow, std::int64_t steps);
 
+/// About how many passes over the volume it takes, if what flows is smooth after a few steps.
+double passes(const MeanCurvatureFlow& flow, const Grid& grid);
+
 /// Lets all isosurfaces of `volume` flow, on all cores of the current arena. No value leaves the input's
 /// range; the result does not depend on the number of threads. The volume's buffer may be another one
 /// afterwards: spans into it taken before are stale. When `report` throws, the intensities are left

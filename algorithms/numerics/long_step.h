@@ -83,8 +83,8 @@ class LongStep {
     double start, start_moved, result, result_moved;
   };
   ErrorWeights error_weights() const {
-    constexpr double kScale =
-        0.8;  // a fifteenth of the third derivative, of which the trapezium has a twelfth
+    // A fifteenth of the third derivative, of which the trapezium has a twelfth.
+    constexpr double kScale = 0.8;
     const double of_start = kScale * steps_ * (1 - bend_ / 2), of_result = kScale * steps_ * bend_ / 2;
     return {.start = kScale - of_start,
             .start_moved = of_start,

@@ -116,6 +116,8 @@ WorkerPool::Work JobService::State::claim(JobStore::Work work) {
       used == 0 ? std::numeric_limits<std::int64_t>::max() : settings.memory_limit_bytes - used;
   const bool long_ones = running.long_ones() < std::max(1, settings.workers - 1);
   auto job = jobs.claim(free, work, long_ones);
+  // The oldest does not fit beside a long one: those of seconds need not wait with it for that to end.
+  if (!job && running.long_ones() > 0) job = jobs.claim(free, work, false);
   if (!job) return {};
   const auto claimed =
       std::make_shared<ClaimedJob>(*std::move(job), jobs.event_counter(), running,

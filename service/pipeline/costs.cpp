@@ -2,13 +2,13 @@
 
 namespace volsmooth {
 
-double total_cost(const std::vector<Part>& parts, double isovalues, double voxels) {
+double total_cost(const std::vector<Part>& parts, double isovalues, const Grid& grid) {
   double cost = kReadCost + 2 * kMeasureCost + isovalues * kSurfaceCost / 2;
   for (const Part& part : parts) {
-    cost +=
-        kStepCost * steps_of(part) + kMeasureCost + kWriteCost + isovalues * (kSurfaceCost + kMeshWriteCost);
+    cost += kStepCost * passes_of(part, grid) + kMeasureCost + kWriteCost +
+            isovalues * (kSurfaceCost + kMeshWriteCost);
   }
-  return cost * voxels;
+  return cost * static_cast<double>(voxel_count(grid.size));
 }
 
 }  // namespace volsmooth

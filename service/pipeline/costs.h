@@ -11,6 +11,6 @@ inline constexpr double kReadCost = 12e-9, kStepCost = 1.2e-9, kMeasureCost = 1e
                         kWriteCost = 15e-9, kMeshWriteCost = 5e-9;
 
 /// Rough seconds that the parts of a job take together.
-double total_cost(const std::vector<Part>& parts, double isovalues, double voxels);
+double total_cost(const std::vector<Part>& parts, double isovalues, const Grid& grid);
 
 }  // namespace volsmooth

@@ -36,12 +36,8 @@ std::optional<double> surface_of(const ParameterValues& parameters) {
   return std::get<double>(found->second);
 }
 
-double steps_of(const Part& part) {
-  const auto number = [&](const char* name, double otherwise) {
-    const auto found = part.parameters.find(name);
-    return found == part.parameters.end() ? otherwise : std::get<double>(found->second);
-  };
-  return number("steps", 1) + number("sharpening_steps", 0);
+double passes_of(const Part& part, const Grid& grid) {
+  return part.method->passes(part.parameters, grid);
 }
 
 }  // namespace volsmooth

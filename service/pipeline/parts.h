@@ -26,7 +26,7 @@ std::vector<Part> parts_of(const JobOrder& order, const ParameterValues& resolve
 /// Whether the order speaks of a single surface, and which.
 std::optional<double> surface_of(const ParameterValues& parameters);
 
-/// Passes over the volume: 1 for a method that does not count its steps.
-double steps_of(const Part& part);
+/// What a part costs, about, in explicit steps over the volume.
+double passes_of(const Part& part, const Grid& grid);
 
 }  // namespace volsmooth

@@ -13,11 +13,13 @@ namespace {
 /// A method works in place on the input; of several, all but the last work on a copy.
 constexpr double kBytesPerVoxelOfVolume = sizeof(float);
 
-/// A surface with its normals takes 54 bytes a vertex: this much for a vertex in every tenth voxel, as noisy
-/// volumes of up to 512^3 have them; beyond, it grows with the area. What really comes out is held to the
-/// job's limit when it is counted (run_job.cpp).
-double bytes_per_voxel_of_surface(double voxels) {
-  return 5.5 * std::min(1.0, 512 / std::cbrt(voxels));
+/// A surface with its normals, and what one is searched by for how far another has moved.
+constexpr double kBytesPerVertex = 54, kBytesPerVertexOfSearch = 90;
+
+/// As many as noisy volumes of up to 256^3 have; beyond, a surface grows with the area. What really comes out
+/// is held to the job's limit when it is counted (run_job.cpp).
+double vertices_per_voxel(double voxels) {
+  return 0.1 * std::min(1.0, 256 / std::cbrt(voxels));
 }
 
 /// Jobs that take no longer may overtake those that do.
@@ -100,7 +102,7 @@ tl::expected<JobPlan, Problem> plan_job(const JobOrder& order, const VolumeFacts
   double steps = 0, extra_bytes_per_voxel = 0;
   const std::vector<Part> parts = parts_of(order, plan.parameters, input);
   for (const Part& part : parts) {
-    steps += steps_of(part);
+    steps += passes_of(part, input.grid);
     extra_bytes_per_voxel =
         std::max(extra_bytes_per_voxel, part.method->extra_bytes_per_voxel(part.parameters));
   }
@@ -119,9 +121,10 @@ tl::expected<JobPlan, Problem> plan_job(const JobOrder& order, const VolumeFacts
   const double surfaces = order.isovalues ? static_cast<double>(order.isovalues->size()) : 1;
   const double padding = volume.format == "dicom" ? kBytesPerVoxelOfPadding : 0;
   // While it flows, the surfaces of the original are held; afterwards those of the result as well.
-  const double surface_bytes = bytes_per_voxel_of_surface(voxels) * surfaces;
+  const double surface_bytes = vertices_per_voxel(voxels) * kBytesPerVertex * surfaces;
+  const double search_bytes = surfaces > 0 ? vertices_per_voxel(voxels) * kBytesPerVertexOfSearch : 0;
   const double bytes_per_voxel = kBytesPerVoxelOfVolume * volumes_held + surface_bytes +
-                                 std::max(extra_bytes_per_voxel, surface_bytes) + padding;
+                                 std::max(extra_bytes_per_voxel, surface_bytes + search_bytes) + padding;
   plan.memory_bytes = kFixedBytes + static_cast<std::int64_t>(std::ceil(voxels * bytes_per_voxel));
   if (limits.max_memory_bytes > 0 && plan.memory_bytes > limits.max_memory_bytes) {
     return tl::unexpected(
@@ -131,7 +134,7 @@ tl::expected<JobPlan, Problem> plan_job(const JobOrder& order, const VolumeFacts
                     "; crop or coarsen the volume, ask for fewer isovalues, or for a larger limit.",
                 {{"estimate_bytes", plan.memory_bytes}, {"limit_bytes", limits.max_memory_bytes}}});
   }
-  plan.is_long = total_cost(parts, surfaces, voxels) > kSecondsOfShortJob;
+  plan.is_long = total_cost(parts, surfaces, input.grid) > kSecondsOfShortJob;
   return plan;
 }
 

@@ -29,15 +29,16 @@ std::int64_t peak_memory_bytes() {
 
 ordered_json row(const FoliationRow& foliation) {
   const auto& [method, parameters, before, after, written, integration] = foliation;
-  return {{"method", method},
-          {"parameters", ordered_json(to_json(parameters))},
-          {"mass", before_after(before.mass, after.mass)},
-          {"area", before_after(before.area, after.area)},
-          {"intensity_min", before_after(before.minimum, after.minimum)},
-          {"intensity_max", before_after(before.maximum, after.maximum)},
-          {"rounding_rms", written.rounding_rms},
-          {"clipped_voxels", written.clipped_voxels},
-          {"integration", ordered_json(to_json(integration))}};
+  ordered_json document = {{"method", method},
+                           {"parameters", ordered_json(to_json(parameters))},
+                           {"mass", before_after(before.mass, after.mass)},
+                           {"area", before_after(before.area, after.area)},
+                           {"intensity_min", before_after(before.minimum, after.minimum)},
+                           {"intensity_max", before_after(before.maximum, after.maximum)},
+                           {"rounding_rms", written.rounding_rms},
+                           {"clipped_voxels", written.clipped_voxels}};
+  if (!integration.empty()) document["integration"] = ordered_json(to_json(integration));
+  return document;
 }
 
 ordered_json row(const SurfaceRow& surface) {

@@ -33,7 +33,7 @@ class JobRun {
         voxels_(static_cast<double>(voxel_count(task.volume.facts.size))),
         clock_(
             total_cost(parts_, static_cast<double>(task.order.isovalues ? task.order.isovalues->size() : 1),
-                       voxels_),
+                       input_of(task.volume.facts).grid),
             report) {}
 
   tl::expected<std::vector<Result>, Problem> run() {
@@ -100,9 +100,10 @@ class JobRun {
     const Volume::Pointer volume = volume_for(part);
     dicom_.begin_method(name, part.parameters);
     FoliationRow foliation{name, part.parameters, original_foliation_, {}, {}, {}};
-    clock_.run("flow", kStepCost * steps_of(part) * voxels_, [&](const Progress& progress) {
-      foliation.integration = part.method->run(*volume, part.parameters, progress);
-    });
+    clock_.run("flow", kStepCost * passes_of(part, input_of(task_.volume.facts).grid) * voxels_,
+               [&](const Progress& progress) {
+                 foliation.integration = part.method->run(*volume, part.parameters, progress);
+               });
     clock_.run("flow", kMeasureCost * voxels_,
                [&](const Progress& progress) { foliation.after = measure(*volume, progress); });
 

@@ -228,7 +228,30 @@ TEST(Catalog, TellsWhatMeanCurvatureFlowHoldsAndTook) {
     EXPECT_EQ(number(values, "long_steps"), 0);
   }
   EXPECT_LT(number(many, "evaluations"), 1.2 * number(many, "steps"));
+  EXPECT_GT(number(many, "long_steps") + number(many, "rejected_steps"), 0);
   EXPECT_EQ(find_method("offset")->extra_bytes_per_voxel({}), 4);
+}
+
+/// What an order of before there was a tolerance resolved to, and what was reserved for it.
+TEST(Catalog, WithoutAToleranceStepsAreShort) {
+  const Method& method = *find_method("mean-curvature-flow");
+  auto resolved = method.resolve({{"flow_time_mm2", 9.0}}, kInput);
+  resolved.erase("tolerance_voxels");
+  auto volume = volume_of(kGrid, noise(kGrid.size, 1));
+  EXPECT_EQ(number(method.run(*volume, resolved, no_progress), "long_steps"), 0);
+  EXPECT_EQ(method.extra_bytes_per_voxel(resolved), 4);
+}
+
+TEST(Catalog, LongStepsAndConvolutionsCostLessThanTheStepsTheyStandFor) {
+  const Method &curvature = *find_method("mean-curvature-flow"), &heat = *find_method("laplacian");
+  const auto passes = [&](const Method& method, ParameterValues asked) {
+    return method.passes(method.resolve(asked, kInput), kGrid);
+  };
+  const double steps = passes(curvature, {{"flow_time_mm2", 1000.0}, {"tolerance_voxels", 0.0}});
+  EXPECT_EQ(steps, number(curvature.resolve({{"flow_time_mm2", 1000.0}}, kInput), "steps"));
+  EXPECT_LT(passes(curvature, {{"flow_time_mm2", 1000.0}}), steps / 4);
+  EXPECT_LT(passes(heat, {{"flow_time_mm2", 1000.0}}), steps / 10);
+  EXPECT_GT(passes(heat, {{"flow_time_mm2", 1000.0}}), 6);
 }
 
 TEST(Catalog, RunsMeanCurvatureFlowUnderItsName) {

@@ -24,6 +24,9 @@ struct WrittenFile {
   std::int64_t clipped_voxels = 0;
 };
 
+/// Of an enhanced object, which says its slopes in there.
+constexpr std::uint32_t kFunctionalGroups = 0x52009229;
+
 class SeriesWriter {
  public:
   SeriesWriter(const DicomSeries& series, std::span<const float> intensities, const Derivation& derivation,
@@ -73,7 +76,7 @@ class SeriesWriter {
     for (const std::size_t index : slices_[which]) {
       DicomSlice slice = series_.slices[index];
       const auto plane = plane_at_slice(series_, intensities_, index, mixed);
-      if (own_slopes_) fit_slope(slice, plane, set);
+      if (own_slopes_ && !has(set, kFunctionalGroups)) fit_slope(slice, plane, set);
       if (bytes.empty()) {
         bytes = part10_file(set);
         begin_pixels(bytes, slices_[which].size());

@@ -61,6 +61,15 @@ TEST_P(AlongAxis, HoldsValuesInRange) {
   EXPECT_EQ(std::ranges::max(voxels), 0.6F);
 }
 
+/// With voxels of a nanometre and the longest flow time, the Gaussian itself would take gigabytes.
+TEST(HeatWeights, OfAnyTimeReachNoFartherThanTheLine) {
+  for (const double time : {100.0, 1e6, 1e18}) {
+    std::vector<float> line{1, 0, 0};
+    convolve_lines(line, {3, 1, 1}, {0, heat_weights(time, 3), kAny});
+    for (const float value : line) EXPECT_NEAR(value, 1.0F / 3, 1e-6F) << time;
+  }
+}
+
 TEST(HeatWeights, AddUpToOneInFloat) {
   for (const double time : {0.3, 4.0, 77.0, 1e5})
     for (const std::int64_t count : {5, 300}) {

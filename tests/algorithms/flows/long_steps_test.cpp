@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "algorithms/flows/mean_curvature_flow.h"
+#include "algorithms/volume/parallel.h"
 #include "tests/support/phantoms.h"
 
 namespace volsmooth {
@@ -63,6 +64,23 @@ struct Decay {
                 }};
   }
 };
+
+TEST(LongSteps, FifteenAreNotTooFew) {
+  Decay decay{.error = 0};
+  auto volume = volume_of(kLine, kBefore);
+  EXPECT_GT(take_long_steps(*volume, 15, 0.01, decay.flow(), no_progress).long_steps, 0);
+}
+
+/// The judge's sums decide which steps are taken.
+TEST(LongSteps, AreTheSameForAnyNumberOfThreads) {
+  const Grid grid{{37, 23, 19}, {1, 1, 1}};
+  const auto with = [&](int threads) {
+    std::vector<float> values;
+    with_threads(threads, [&] { values = smoothed(grid, noise(grid.size, 3), {.flow_time_mm2 = 30}); });
+    return values;
+  };
+  EXPECT_EQ(with(1), with(2));
+}
 
 TEST(LongSteps, StandForAllTheExplicitSteps) {
   Decay decay{.error = 0.005};  // for a tolerance of twice that, lengths stay about the same

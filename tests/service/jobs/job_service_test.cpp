@@ -260,6 +260,21 @@ TEST_F(JobServiceTest, AJobOfSecondsNeedNotWaitForLongOnes) {
   for (const std::string& id : long_ones) EXPECT_EQ(wait_for(*service_, id).state, JobState::kSucceeded);
 }
 
+TEST_F(JobServiceTest, NorForALongOneThatWaitsForTheMemoryOfAnother) {
+  open_and_start();
+  const auto volume = upload(*service_, "x").value();
+  fake_.memory_bytes = 60;
+  const std::string runs = service_->submit(order_for(volume.id, "gate")).value().id;
+  while (fake_.at_gate < 1) std::this_thread::yield();
+  const std::string waits = service_->submit(order_for(volume.id, "gate")).value().id;
+  fake_.memory_bytes = 30;
+  const std::string quick = service_->submit(order_for(volume.id)).value().id;
+  EXPECT_EQ(wait_for(*service_, quick).state, JobState::kSucceeded);
+  EXPECT_EQ(service_->job(waits).value().state, JobState::kQueued);
+  fake_.open_gate();
+  for (const std::string& id : {runs, waits}) EXPECT_EQ(wait_for(*service_, id).state, JobState::kSucceeded);
+}
+
 TEST_F(JobServiceTest, AJobLargerThanTheLimitRunsAlone) {
   open_and_start();
   const auto volume = upload(*service_, "x").value();
