@@ -1,19 +1,18 @@
 // measure_large_volume [SIZE]: smooths SIZE^3 int16 voxels (1024: 2 GB) of noisy spheres by one feature
-// radius of two voxels, with one isosurface, and prints the seconds of each stage, the memory that was
-// reserved and the peak.
+// radius of two voxels, with one isosurface, and prints the peak of the memory and the report, which has the
+// seconds of each stage.
 #include <cmath>
 #include <cstdio>
 
-#include "tests/system/nifti_bytes.h"
-#include "tests/system/service_client.h"
+#include "tests/system/streamed_upload.h"
 
 using namespace volsmooth::test;
 
 namespace {
 
 /// A ball whose edge is eight voxels wide, and noise of a tenth of its height.
-std::string slice(int size, int z, std::uint32_t& state) {
-  std::vector<std::int16_t> voxels;
+Slice slice(int size, int z, std::uint32_t& state) {
+  Slice voxels;
   voxels.reserve(static_cast<std::size_t>(size) * static_cast<std::size_t>(size));
   const double middle = size / 2.0;
   for (int y = 0; y < size; ++y) {
@@ -24,22 +23,7 @@ std::string slice(int size, int z, std::uint32_t& state) {
       voxels.push_back(static_cast<std::int16_t>(1000 / (1 + std::exp(distance / 4)) + 100 * noise));
     }
   }
-  return {reinterpret_cast<const char*>(voxels.data()), voxels.size() * sizeof(std::int16_t)};
-}
-
-std::string upload(const Daemon& daemon, int size) {
-  const Bytes header = make_nifti1<std::int16_t>({size, size, size}, {1, 1, 1}, {});
-  const std::size_t length = header.size() + 2 * static_cast<std::size_t>(std::pow(size, 3));
-  HttpConnection connection(daemon.port());
-  connection.set_patience(600);
-  connection.send("POST /v1/volumes HTTP/1.1\r\nHost: localhost\r\nContent-Length: " +
-                  std::to_string(length) + "\r\n\r\n" + header);
-  std::uint32_t state = 1;
-  for (int z = 0; z < size; ++z)
-    if (!connection.send(slice(size, z, state))) throw std::runtime_error("the upload was cut off");
-  const auto answer = connection.read();
-  if (!answer || answer->status != 201) throw std::runtime_error("the upload was refused");
-  return answer->document().at("id");
+  return voxels;
 }
 
 }  // namespace
@@ -48,7 +32,10 @@ int main(int argc, char** argv) {
   const int size = argc > 1 ? std::stoi(argv[1]) : 1024;
   const Daemon daemon(VOLSMOOTHD, {"--memory", "12GB"});
   const ServiceClient service(daemon);
-  const std::string id = service.submit({{"volume", upload(daemon, size)},
+  std::uint32_t state = 1;
+  const json volume =
+      streamed_upload(daemon, {size, size, size}, [&](int z) { return slice(size, z, state); });
+  const std::string id = service.submit({{"volume", volume.at("id")},
                                          {"parameters", {{"feature_radius_mm", 2}}},
                                          {"isovalues", {500}},
                                          {"mesh_formats", {"stl"}}});
