@@ -6,11 +6,7 @@
 #include <itkMultiThreaderBase.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
-#include <ctime>
-#include <map>
-#include <string>
 #include <vector>
 
 #include "algorithms/flows/face_centred_sweep.h"
@@ -19,6 +15,7 @@
 #include "algorithms/flows/mean_curvature_flow.h"
 #include "algorithms/flows/mean_curvature_sweep.h"
 #include "algorithms/volume/parallel.h"
+#include "tests/benchmarks/rounds.h"
 #include "tests/support/phantoms.h"
 
 namespace volsmooth {
@@ -71,26 +68,11 @@ Volume::Pointer itk_curvature_flow(Volume& volume, unsigned iterations, double s
   return filter->GetOutput();
 }
 
-template <class Work>
-double seconds(const Work& work) {
-  const auto start = std::chrono::steady_clock::now();
-  work();
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
-/// Medians over the rounds.
-void count(benchmark::State& state, std::map<std::string, std::vector<double>>& rounds) {
-  for (auto& [name, values] : rounds) {
-    std::ranges::nth_element(values, values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2));
-    state.counters[name] = values[values.size() / 2];
-  }
-}
-
 /// A round times every contestant once; the counters are medians over the rounds of a ratio within a round.
 void flow_steps(benchmark::State& state) {
   const auto threads = static_cast<int>(state.range(0));
   itk::MultiThreaderBase::SetGlobalMaximumNumberOfThreads(static_cast<itk::ThreadIdType>(threads));
-  std::map<std::string, std::vector<double>> rounds;
+  Rounds rounds;
   with_threads(threads, [&] {
     copy();
     for ([[maybe_unused]] auto round : state) {
@@ -102,18 +84,18 @@ void flow_steps(benchmark::State& state) {
           seconds([&] { itk_curvature_flow(*data().volume, kItkIterations, kStep, threads); }) /
           kItkIterations;
       state.SetIterationTime(curvature);
-      rounds["copy_seconds"].push_back(streaming);
-      rounds["mcf_seconds"].push_back(curvature);
-      rounds["face_centred_seconds"].push_back(default_curvature);
-      rounds["laplacian_seconds"].push_back(heat);
-      rounds["itk_seconds"].push_back(itk);
-      rounds["itk_over_mcf"].push_back(itk / curvature);
-      rounds["itk_over_face_centred"].push_back(itk / default_curvature);
-      rounds["mcf_over_copy"].push_back(curvature / streaming);
-      rounds["laplacian_over_copy"].push_back(heat / streaming);
+      rounds.add("copy_seconds", streaming);
+      rounds.add("mcf_seconds", curvature);
+      rounds.add("face_centred_seconds", default_curvature);
+      rounds.add("laplacian_seconds", heat);
+      rounds.add("itk_seconds", itk);
+      rounds.add("itk_over_mcf", itk / curvature);
+      rounds.add("itk_over_face_centred", itk / default_curvature);
+      rounds.add("mcf_over_copy", curvature / streaming);
+      rounds.add("laplacian_over_copy", heat / streaming);
     }
   });
-  count(state, rounds);
+  rounds.report(state);
 }
 
 BENCHMARK(flow_steps)->Arg(1)->Arg(2)->ArgName("threads")->Iterations(7)->UseManualTime();
@@ -147,14 +129,6 @@ double error_of_spheres(const Volume& volume, const std::vector<float>& exact) {
   return std::sqrt(squares / number);
 }
 
-/// Of all threads: on a shared machine the clock on the wall tells of others.
-template <class Work>
-double processor_seconds(const Work& work) {
-  const std::clock_t start = std::clock();
-  work();
-  return static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
-}
-
 constexpr double kItkStep = 0.125;
 
 /// ITK's result, for its error; computed once. Its time in a round is that of eight iterations, times as many
@@ -169,7 +143,7 @@ void time_to_result(benchmark::State& state) {
   constexpr unsigned kTimedIterations = 8;
   const auto time = static_cast<double>(state.range(0));
   itk::MultiThreaderBase::SetGlobalMaximumNumberOfThreads(1);
-  std::map<std::string, std::vector<double>> rounds;
+  Rounds rounds;
   with_threads(1, [&] {
     const std::vector<float> before = spheres_at(0), exact = spheres_at(time);
     state.counters["itk_error"] = itk_error(time, before, exact);
@@ -185,16 +159,16 @@ void time_to_result(benchmark::State& state) {
           [&] { smooth(*stepwise, MeanCurvatureFlow{.flow_time_mm2 = time, .tolerance_voxels = 0}); });
       const double heat = processor_seconds([&] { smooth(*heated, Laplacian{time}); });
       state.SetIterationTime(flow);
-      rounds["flow_seconds"].push_back(flow);
-      rounds["itk_over_flow"].push_back(itk / flow);
-      rounds["itk_over_explicit"].push_back(itk / explicit_flow);
-      rounds["itk_over_heat"].push_back(itk / heat);
+      rounds.add("flow_seconds", flow);
+      rounds.add("itk_over_flow", itk / flow);
+      rounds.add("itk_over_explicit", itk / explicit_flow);
+      rounds.add("itk_over_heat", itk / heat);
       state.counters["error"] = error_of_spheres(*volume, exact);
       state.counters["explicit_error"] = error_of_spheres(*stepwise, exact);
       state.counters["evaluations"] = static_cast<double>(taken.evaluations);
     }
   });
-  count(state, rounds);
+  rounds.report(state);
 }
 
 BENCHMARK(time_to_result)->Arg(1)->Arg(10)->Arg(100)->ArgName("flow_time")->Iterations(5)->UseManualTime();
