@@ -133,8 +133,10 @@ void listen_for_devices(const Options& options, JobService& jobs, std::optional<
   if (options.dimse_listen.empty()) return;
   Inbox inbox;
   inbox.begin = [&jobs] { return jobs.begin_upload(std::nullopt); };
-  inbox.keep = [&jobs](const std::string& preset, IncomingFile file) {
-    return jobs.receive(preset, std::move(file));
+  inbox.keep = [&jobs, &options](const std::string& name, IncomingFile file) {
+    const auto preset = std::ranges::find(options.presets, name, &Preset::name);
+    const Caller device{preset->tenant, "", {Scope::kSubmit}};
+    return jobs.receive(device, name, std::move(file));
   };
   inbox.max_bytes = options.jobs.max_upload_bytes;
   listener.emplace(DimseListener::Settings{options.dimse_listen, options.server.allow_open_network,

@@ -23,7 +23,7 @@ json stored_document(const std::vector<ArrivedInstance>& instances) {
 }  // namespace
 
 Reply post_studies(Api& api, Request& request) {
-  return api.jobs.receive(request.path["preset"], std::move(*request.file))
+  return api.jobs.receive(request.caller, request.path["preset"], std::move(*request.file))
       .map([](const std::vector<ArrivedInstance>& instances) {
         return Response{200, {}, Document{stored_document(instances).dump(), "application/dicom+json"}};
       });

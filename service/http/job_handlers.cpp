@@ -30,20 +30,21 @@ Response accepted(const Job& job) {
   return created(document_of(job), 202, "/v1/jobs/" + job.id);
 }
 
-tl::expected<Job, Problem> submit_text(Api& api, const std::string& text) {
-  return parse_json(text).and_then(order_from).and_then([&](const JobOrder& order) {
-    return api.jobs.submit(order);
+tl::expected<Job, Problem> submit_text(Api& api, const Request& request) {
+  return parse_json(request.text).and_then(order_from).and_then([&](const JobOrder& order) {
+    return api.jobs.submit(request.caller, order);
   });
 }
 
 /// A volume that is deleted again unless a job takes it.
 class VolumeForAJob {
  public:
-  VolumeForAJob(JobService& jobs, std::string id) : jobs_(jobs), id_(std::move(id)) {}
+  VolumeForAJob(JobService& jobs, const Caller& caller, std::string id)
+      : jobs_(jobs), caller_(caller), id_(std::move(id)) {}
   ~VolumeForAJob() {
     if (taken_) return;
     try {
-      (void)jobs_.delete_volume(id_);
+      (void)jobs_.delete_volume(caller_, id_);
     } catch (const std::exception&) {  // the store that failed the job has failed again
     }
   }
@@ -54,6 +55,7 @@ class VolumeForAJob {
 
  private:
   JobService& jobs_;
+  const Caller& caller_;
   std::string id_;
   bool taken_ = false;
 };
@@ -66,11 +68,12 @@ tl::expected<Job, Problem> submit_form(Api& api, Request& request) {
     return tl::unexpected(
         Problem{"unknown-field", "Beside an uploaded volume, the job names none.", {{"field", "volume"}}});
 
-  const auto volume = api.jobs.keep_volume(std::move(*request.file), {});
+  const auto volume = api.jobs.keep_volume(request.caller, std::move(*request.file), {});
   if (!volume) return tl::unexpected(volume.error());
-  VolumeForAJob unclaimed(api.jobs, volume->id);
+  VolumeForAJob unclaimed(api.jobs, request.caller, volume->id);
   if (document->is_object()) (*document)["volume"] = volume->id;
-  auto job = order_from(*document).and_then([&](const JobOrder& order) { return api.jobs.submit(order); });
+  auto job = order_from(*document).and_then(
+      [&](const JobOrder& order) { return api.jobs.submit(request.caller, order); });
   if (job) unclaimed.taken();
   return job;
 }
@@ -93,11 +96,12 @@ Subscribe subscribe_to(Api& api, const std::string& id) {
 }
 
 /// The events after `last_id`, which moves on with them.
-tl::expected<EventStream::Batch, Problem> next_events(Api& api, const std::string& id, std::string& last_id) {
+tl::expected<EventStream::Batch, Problem> next_events(Api& api, const Caller& caller, const std::string& id,
+                                                      std::string& last_id) {
   // Looked at first: when the job is final here, all of its events are there below.
-  const auto job = api.jobs.job(id);
+  const auto job = api.jobs.job(caller, id);
   if (!job) return tl::unexpected(job.error());
-  const auto events = api.jobs.events_after(id, last_id);
+  const auto events = api.jobs.events_after(caller, id, last_id);
   if (!events) return tl::unexpected(events.error());
   EventStream::Batch batch{{}, is_final(job->state)};
   for (const auto& event : *events) batch.text += as_event(event);
@@ -108,7 +112,7 @@ tl::expected<EventStream::Batch, Problem> next_events(Api& api, const std::strin
 }  // namespace
 
 Reply post_job(Api& api, Request& request) {
-  return (request.file ? submit_form(api, request) : submit_text(api, request.text)).map(accepted);
+  return (request.file ? submit_form(api, request) : submit_text(api, request)).map(accepted);
 }
 
 Reply get_jobs(Api& api, Request& request) {
@@ -116,7 +120,7 @@ Reply get_jobs(Api& api, Request& request) {
   const JobQuery wanted{
       job_state_from(text_in(query, "state")), text_in(query, "method"), text_in(query, "label"),
       static_cast<int>(number_in(query, "limit").value_or(kDefaultPage)), text_in(query, "cursor")};
-  return api.jobs.jobs(wanted).map([](const JobPage& page) {
+  return api.jobs.jobs(request.caller, wanted).map([](const JobPage& page) {
     auto documents = nlohmann::json::array();
     for (const auto& job : page.jobs) documents.push_back(document_of(job));
     const auto next = page.next_cursor.empty() ? nlohmann::json() : nlohmann::json(page.next_cursor);
@@ -128,13 +132,13 @@ Reply get_job(Api& api, Request& request) {
   const std::string id = request.path["id"];
   const auto wait = number_in(request.query, "wait").value_or(0);
   if (wait == 0)
-    return api.jobs.job(id).map([&](const Job& job) {
+    return api.jobs.job(request.caller, id).map([&](const Job& job) {
       const auto document = document_of(job);
       return tagged_response(request, document, entity_tag(document.dump()));
     });
 
-  const auto ask = [&api, id] {
-    return api.jobs.job(id).map([](const Job& job) {
+  const auto ask = [&api, caller = request.caller, id] {
+    return api.jobs.job(caller, id).map([](const Job& job) {
       return LongPoll::Answer{document_of(job).dump(), is_final(job.state)};
     });
   };
@@ -145,14 +149,16 @@ Reply get_job(Api& api, Request& request) {
 Reply get_job_events(Api& api, Request& request) {
   const std::string id = request.path["id"];
   std::string last_id(request.head.header("last-event-id"));
-  return api.jobs.events_after(id, last_id).map([&](const auto&) {
-    const auto next = [&api, id, last_id]() mutable { return next_events(api, id, last_id); };
+  return api.jobs.events_after(request.caller, id, last_id).map([&](const auto&) {
+    const auto next = [&api, caller = request.caller, id, last_id]() mutable {
+      return next_events(api, caller, id, last_id);
+    };
     return Response{200, {{"Cache-Control", "no-store"}}, EventStream{subscribe_to(api, id), next}};
   });
 }
 
 Reply cancel_job(Api& api, Request& request) {
-  return api.jobs.cancel(request.path["id"]).map([](const Job& job) {
+  return api.jobs.cancel(request.caller, request.path["id"]).map([](const Job& job) {
     return json_response(document_of(job), 202);
   });
 }
@@ -161,26 +167,26 @@ Reply delete_job(Api& api, Request& request) {
   const auto is_wanted = [&](const Job& job) {
     return if_match_holds(request.head, entity_tag(document_of(job).dump()));
   };
-  return api.jobs.delete_job(request.path["id"], is_wanted).and_then([](bool deleted) -> Reply {
-    if (!deleted) return tl::unexpected(has_changed());
-    return Response{204};
-  });
+  return api.jobs.delete_job(request.caller, request.path["id"], is_wanted)
+      .and_then([](bool deleted) -> Reply {
+        if (!deleted) return tl::unexpected(has_changed());
+        return Response{204};
+      });
 }
 
 Reply get_results(Api& api, Request& request) {
-  return api.jobs.job(request.path["id"]).map([](const Job& job) {
+  return api.jobs.job(request.caller, request.path["id"]).map([](const Job& job) {
     return json_response({{"results", results_of(job)}});
   });
 }
 
 Reply get_result(Api& api, Request& request) {
-  return api.jobs.result(request.path["id"], request.path["name"]).and_then([&](const StoredFile& file) {
-    return reply_with_file(request, file);
-  });
+  return api.jobs.result(request.caller, request.path["id"], request.path["name"])
+      .and_then([&](const StoredFile& file) { return reply_with_file(request, file); });
 }
 
 Reply get_delivery(Api& api, Request& request) {
-  return api.jobs.ledger(request.path["id"]).map([](const std::vector<LedgerEntry>& ledger) {
+  return api.jobs.ledger(request.caller, request.path["id"]).map([](const std::vector<LedgerEntry>& ledger) {
     auto documents = nlohmann::json::array();
     for (const auto& entry : ledger) documents.push_back(to_json(entry));
     return json_response({{"instances", documents}});
@@ -188,7 +194,7 @@ Reply get_delivery(Api& api, Request& request) {
 }
 
 Reply deliver_again(Api& api, Request& request) {
-  return api.jobs.deliver_again(request.path["id"]).map([](const Job& job) {
+  return api.jobs.deliver_again(request.caller, request.path["id"]).map([](const Job& job) {
     return json_response(document_of(job), 202);
   });
 }

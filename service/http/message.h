@@ -15,6 +15,7 @@
 #include "service/http/head_check.h"
 #include "service/http/open_file.h"
 #include "service/http/target.h"
+#include "service/jobs/caller.h"
 #include "service/jobs/job_service.h"
 
 namespace volsmooth {
@@ -22,6 +23,7 @@ namespace volsmooth {
 /// A request as the handlers see it: matched, its query checked, its body received.
 struct Request {
   Head head;
+  Caller caller;
   std::map<std::string, std::string, std::less<>> path;  ///< by the names in the route's pattern
   QueryValues query;
   std::string text;                  ///< a JSON body

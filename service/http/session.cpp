@@ -110,6 +110,7 @@ tl::expected<void, Problem> Session::admit(Exchange& exchange) const {
   auto match = match_route(request.head.method, target->segments);
   if (!match) return tl::unexpected(match.error());
   exchange.route = match->route;
+  request.caller = Caller::anyone();
   request.path = std::move(match->path);
   request.query = std::move(target->query);
   if (auto checked = check_query(*exchange.route, request.query); !checked) return checked;

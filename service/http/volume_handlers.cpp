@@ -21,36 +21,36 @@ UploadOptions upload_options(const QueryValues& query) {
 }  // namespace
 
 Reply post_volume(Api& api, Request& request) {
-  return api.jobs.keep_volume(std::move(*request.file), upload_options(request.query))
+  return api.jobs.keep_volume(request.caller, std::move(*request.file), upload_options(request.query))
       .map([](const StoredVolume& volume) {
         return created(to_json(volume), 201, "/v1/volumes/" + volume.id);
       });
 }
 
-Reply get_volumes(Api& api, Request&) {
+Reply get_volumes(Api& api, Request& request) {
   auto documents = nlohmann::json::array();
-  for (const auto& volume : api.jobs.volumes()) documents.push_back(to_json(volume));
+  for (const auto& volume : api.jobs.volumes(request.caller)) documents.push_back(to_json(volume));
   return json_response({{"volumes", documents}});
 }
 
 Reply get_volume(Api& api, Request& request) {
-  return api.jobs.volume(request.path["id"]).map([&](const StoredVolume& volume) {
+  return api.jobs.volume(request.caller, request.path["id"]).map([&](const StoredVolume& volume) {
     return tagged_response(request, to_json(volume), entity_tag(volume));
   });
 }
 
 Reply get_volume_content(Api& api, Request& request) {
-  return api.jobs.volume_content(request.path["id"]).and_then([&](const StoredFile& file) {
+  return api.jobs.volume_content(request.caller, request.path["id"]).and_then([&](const StoredFile& file) {
     return reply_with_file(request, file);
   });
 }
 
 Reply delete_volume(Api& api, Request& request) {
   // A volume never changes, so nothing can come between the look and the step but its end.
-  if (const auto found = api.jobs.volume(request.path["id"]);
+  if (const auto found = api.jobs.volume(request.caller, request.path["id"]);
       found && !if_match_holds(request.head, entity_tag(*found)))
     return tl::unexpected(has_changed());
-  return api.jobs.delete_volume(request.path["id"]).map([] { return Response{204}; });
+  return api.jobs.delete_volume(request.caller, request.path["id"]).map([] { return Response{204}; });
 }
 
 }  // namespace volsmooth

@@ -12,28 +12,29 @@ std::vector<std::string> texts_of(Statement rows) {
 
 }  // namespace
 
-bool ArrivalStore::add(std::string_view preset, std::string_view file,
+bool ArrivalStore::add(std::string_view tenant, std::string_view preset, std::string_view file,
                        const std::vector<ArrivedInstance>& instances) {
   return database_.write([&](Database& database) {
     for (const ArrivedInstance& instance : instances)
       database.run(
-          "INSERT INTO arrivals (preset, study, series, sop_instance_uid, file, offset, bytes, received_ms) "
-          "VALUES (?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT DO UPDATE SET received_ms = excluded.received_ms",
+          "INSERT INTO arrivals (preset, study, series, sop_instance_uid, file, offset, bytes, received_ms, "
+          "tenant) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT DO UPDATE SET received_ms = "
+          "excluded.received_ms",
           preset, instance.study_uid, instance.series_uid, instance.sop_instance_uid, file, instance.offset,
-          instance.bytes, milliseconds_of(now_in_milliseconds()));
+          instance.bytes, milliseconds_of(now_in_milliseconds()), tenant);
     audit(database, preset, "instances received");
     return database.query("SELECT 1 FROM arrivals WHERE file = ? LIMIT 1", file).step();
   });
 }
 
-std::optional<DicomSource> ArrivalStore::quiet_since(const std::string& preset, Time since) {
-  return database_.read([&](Database& database) -> std::optional<DicomSource> {
+std::optional<ArrivalStore::QuietSeries> ArrivalStore::quiet_since(const std::string& preset, Time since) {
+  return database_.read([&](Database& database) -> std::optional<QuietSeries> {
     Statement row = database.query(
-        "SELECT study, series FROM arrivals WHERE preset = ? AND job IS NULL "
-        "GROUP BY study, series HAVING max(received_ms) <= ? ORDER BY min(sequence)",
+        "SELECT study, series, tenant FROM arrivals WHERE preset = ? AND job IS NULL "
+        "GROUP BY study, series, tenant HAVING max(received_ms) <= ? ORDER BY min(sequence)",
         preset, milliseconds_of(since));
     if (!row.step()) return std::nullopt;
-    return DicomSource{"", row.text(0), row.text(1), preset};
+    return QuietSeries{{"", row.text(0), row.text(1), preset}, row.text(2)};
   });
 }
 
@@ -59,11 +60,11 @@ std::vector<std::string> ArrivalStore::files() {
       [](Database& database) { return texts_of(database.query("SELECT DISTINCT file FROM arrivals")); });
 }
 
-void hand_over(Database& database, const DicomSource& series, std::string_view job_id) {
+void hand_over(Database& database, const ArrivalStore::QuietSeries& series, std::string_view job_id) {
   database.run(
       "UPDATE arrivals SET job = (SELECT sequence FROM jobs WHERE id = ?1) "
-      "WHERE preset = ?2 AND study = ?3 AND series = ?4 AND job IS NULL",
-      job_id, series.preset, series.study, series.series);
+      "WHERE preset = ?2 AND study = ?3 AND series = ?4 AND tenant = ?5 AND job IS NULL",
+      job_id, series.source.preset, series.source.study, series.source.series, series.tenant);
 }
 
 std::vector<std::string> forget_arrivals(Database& database, std::string_view job_id) {

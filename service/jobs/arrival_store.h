@@ -25,10 +25,15 @@ class ArrivalStore {
 
   /// One that waits already stays as it is, but its series is not quiet: devices send again what they had no
   /// answer for. False: all were such, and nothing is in the file that is not in others.
-  bool add(std::string_view preset, std::string_view file, const std::vector<ArrivedInstance>& instances);
+  bool add(std::string_view tenant, std::string_view preset, std::string_view file,
+           const std::vector<ArrivedInstance>& instances);
 
-  /// A series of that preset of which nothing has arrived since.
-  std::optional<DicomSource> quiet_since(const std::string& preset, Time since);
+  /// A series of that preset of which nothing has arrived since, and whose it is.
+  struct QuietSeries {
+    DicomSource source;
+    std::string tenant;
+  };
+  std::optional<QuietSeries> quiet_since(const std::string& preset, Time since);
 
   std::vector<ArrivedPart> parts_of(std::string_view job_id);
   /// `forget_arrivals`, in a transaction of its own.
@@ -41,7 +46,7 @@ class ArrivalStore {
 };
 
 /// What has arrived of a series is that job's from now on; part of the transaction that inserts it.
-void hand_over(Database& database, const DicomSource& series, std::string_view job_id);
+void hand_over(Database& database, const ArrivalStore::QuietSeries& series, std::string_view job_id);
 
 /// Forgets the instances of a job, likewise; returns the files that are nobody's any more.
 std::vector<std::string> forget_arrivals(Database& database, std::string_view job_id);

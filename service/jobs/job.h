@@ -49,6 +49,7 @@ struct VolumeFacts {
 /// A verified, durable upload. Immutable.
 struct StoredVolume {
   std::string id;
+  std::string tenant;  ///< whose it is
   UploadOptions options;
   VolumeFacts facts;
   std::int64_t bytes = 0;
@@ -131,6 +132,7 @@ struct Delivery {
 
 struct Job {
   std::string id;
+  std::string tenant;  ///< whose it is
   JobState state = JobState::kQueued;
   JobOrder order;
   ParameterValues parameters;  ///< resolved

@@ -62,7 +62,7 @@ tl::expected<std::vector<Result>, Problem> JobRunner::compute(ClaimedJob& claim)
   report("read", 0);
 
   // The volume cannot be deleted while the job runs, unless the job itself was: then it is interrupted.
-  const auto volume = VolumeStore(database_).find(job.order.volume);
+  const auto volume = VolumeStore(database_).find(job.tenant, job.order.volume);
   if (!volume) throw Cancelled();
   const fs::path file = files_.path_of(volume_file(volume->id));
   if (!fs::exists(file) || digest_of(file, [&] { running.throw_if_interrupted(); }).sha256 != volume->sha256)

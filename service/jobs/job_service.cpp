@@ -56,13 +56,15 @@ tl::expected<IncomingFile, Problem> JobService::begin_upload(std::optional<std::
                 {{"free_bytes", std::max<std::int64_t>(state_->files.available_bytes(), 0)}});
 }
 
-tl::expected<StoredVolume, Problem> JobService::keep_volume(IncomingFile file, const UploadOptions& options) {
+tl::expected<StoredVolume, Problem> JobService::keep_volume(const Caller& caller, IncomingFile file,
+                                                            const UploadOptions& options) {
   if (file.bytes() > state_->settings.max_upload_bytes) return too_large(state_->settings.max_upload_bytes);
   StoredVolume volume;
   volume.sha256 = file.finish();
   auto facts = state_->verify(file.path(), options);
   if (!facts) return tl::unexpected(std::move(facts.error()));
   volume.id = new_id("v-");
+  volume.tenant = caller.tenant;
   volume.options = options;
   volume.facts = *std::move(facts);
   volume.bytes = file.bytes();
@@ -79,7 +81,8 @@ tl::expected<StoredVolume, Problem> JobService::keep_volume(IncomingFile file, c
   return volume;
 }
 
-tl::expected<std::vector<ArrivedInstance>, Problem> JobService::receive(std::string_view preset,
+tl::expected<std::vector<ArrivedInstance>, Problem> JobService::receive(const Caller& caller,
+                                                                        std::string_view preset,
                                                                         IncomingFile file) {
   if (std::ranges::find(state_->pacs.presets, preset, &Preset::name) == state_->pacs.presets.end())
     return refuse("not-found", "The configuration has no such preset.");
@@ -90,7 +93,7 @@ tl::expected<std::vector<ArrivedInstance>, Problem> JobService::receive(std::str
   const std::string place = new_arrival_file();
   state_->files.adopt(std::move(file), place);
   try {
-    if (!state_->arrivals.add(preset, place, *instances)) state_->files.remove(place);
+    if (!state_->arrivals.add(caller.tenant, preset, place, *instances)) state_->files.remove(place);
   } catch (...) {
     if (!state_->database.condemned()) state_->files.remove(place);
     throw;
@@ -98,23 +101,23 @@ tl::expected<std::vector<ArrivedInstance>, Problem> JobService::receive(std::str
   return instances;
 }
 
-std::vector<StoredVolume> JobService::volumes() {
-  return state_->volumes.all();
+std::vector<StoredVolume> JobService::volumes(const Caller& caller) {
+  return state_->volumes.of_tenant(caller.tenant);
 }
 
-tl::expected<StoredVolume, Problem> JobService::volume(std::string_view id) {
-  if (auto found = state_->volumes.find(id)) return *std::move(found);
-  return state_->missing(id, "volume");
+tl::expected<StoredVolume, Problem> JobService::volume(const Caller& caller, std::string_view id) {
+  if (auto found = state_->volumes.find(caller.tenant, id)) return *std::move(found);
+  return state_->missing(caller, id, "volume");
 }
 
-tl::expected<StoredFile, Problem> JobService::volume_content(std::string_view id) {
-  auto found = volume(id);
+tl::expected<StoredFile, Problem> JobService::volume_content(const Caller& caller, std::string_view id) {
+  auto found = volume(caller, id);
   if (!found) return tl::unexpected(std::move(found.error()));
   return state_->stored_file(volume_file(id), "application/octet-stream", found->bytes, found->sha256);
 }
 
-tl::expected<void, Problem> JobService::delete_volume(std::string_view id) {
-  switch (state_->volumes.remove(id)) {
+tl::expected<void, Problem> JobService::delete_volume(const Caller& caller, std::string_view id) {
+  switch (state_->volumes.remove(caller.tenant, id)) {
     case VolumeStore::Removal::kDone:
       state_->files.remove(volume_file(id));
       return {};
@@ -124,17 +127,17 @@ tl::expected<void, Problem> JobService::delete_volume(std::string_view id) {
     case VolumeStore::Removal::kUnknown:
       break;
   }
-  return state_->unless_gone(id, "volume");
+  return state_->unless_gone(caller, id, "volume");
 }
 
-tl::expected<Job, Problem> JobService::submit(const JobOrder& order) {
+tl::expected<Job, Problem> JobService::submit(const Caller& caller, const JobOrder& order) {
   if (auto checked = state_->check(order); !checked) return tl::unexpected(std::move(checked.error()));
   const auto no_volume = [] {
     return refuse("not-found", "There is no such volume.", {{"member", "volume"}});
   };
   JobPlan plan{order.parameters};
   if (!order.source) {
-    const auto volume = state_->volumes.find(order.volume);
+    const auto volume = state_->volumes.find(caller.tenant, order.volume);
     if (!volume) return no_volume();
     auto made = state_->engine.plan(order, volume->facts);
     if (!made) return tl::unexpected(std::move(made.error()));
@@ -143,6 +146,7 @@ tl::expected<Job, Problem> JobService::submit(const JobOrder& order) {
 
   Job job;
   job.id = new_id("j-");
+  job.tenant = caller.tenant;
   job.order = order;
   job.parameters = std::move(plan.parameters);
   job.memory_bytes = plan.memory_bytes;
@@ -162,18 +166,18 @@ tl::expected<Job, Problem> JobService::submit(const JobOrder& order) {
   return job;
 }
 
-tl::expected<Job, Problem> JobService::job(std::string_view id) {
-  if (auto found = state_->jobs.find(id)) return state_->with_progress(*std::move(found));
-  return state_->missing(id, "job");
+tl::expected<Job, Problem> JobService::job(const Caller& caller, std::string_view id) {
+  if (auto found = state_->jobs.find(caller.tenant, id)) return state_->with_progress(*std::move(found));
+  return state_->missing(caller, id, "job");
 }
 
-tl::expected<JobPage, Problem> JobService::jobs(const JobQuery& query) {
+tl::expected<JobPage, Problem> JobService::jobs(const Caller& caller, const JobQuery& query) {
   std::optional<std::int64_t> before;
   if (!query.cursor.empty()) {
     before = sequence_from(query.cursor);
     if (!before) return refuse("bad-query", "'cursor' must be the next_cursor of the page before.");
   }
-  auto listed = state_->jobs.list(query, before);
+  auto listed = state_->jobs.list(caller.tenant, query, before);
   JobPage page;
   if (std::ssize(listed) > query.limit) {
     listed.resize(static_cast<std::size_t>(query.limit));
@@ -183,9 +187,9 @@ tl::expected<JobPage, Problem> JobService::jobs(const JobQuery& query) {
   return page;
 }
 
-tl::expected<Job, Problem> JobService::cancel(std::string_view id) {
+tl::expected<Job, Problem> JobService::cancel(const Caller& caller, std::string_view id) {
   // Repeated when the job moves on between the look and the step; it can do so only a few times.
-  while (const auto found = state_->jobs.find(id)) {
+  while (const auto found = state_->jobs.find(caller.tenant, id)) {
     bool stepped = is_final(found->state);
     if (found->state == JobState::kQueued) {
       stepped = state_->settle(
@@ -199,16 +203,18 @@ tl::expected<Job, Problem> JobService::cancel(std::string_view id) {
         state_->recover();
       }
     }
-    if (stepped) return job(id);
+    if (stepped) return job(caller, id);
   }
-  return state_->missing(id, "job");
+  return state_->missing(caller, id, "job");
 }
 
-tl::expected<bool, Problem> JobService::delete_job(std::string_view id,
+tl::expected<bool, Problem> JobService::delete_job(const Caller& caller, std::string_view id,
                                                    const std::function<bool(const Job&)>& is_wanted) {
+  if (!state_->jobs.find(caller.tenant, id))
+    return state_->unless_gone(caller, id, "job").map([] { return true; });
   const auto removed =
       state_->jobs.remove(id, [&](const Job& job) { return is_wanted(state_->with_progress(job)); });
-  if (!removed) return state_->unless_gone(id, "job").map([] { return true; });
+  if (!removed) return state_->unless_gone(caller, id, "job").map([] { return true; });
   if (!removed->removed) return false;
   if (const auto running = state_->running.find(id)) running->interrupt(RunningJob::Interruption::kCancel);
   for (const std::string& file : removed->arrived_files) state_->files.remove(file);
@@ -218,27 +224,32 @@ tl::expected<bool, Problem> JobService::delete_job(std::string_view id,
   return true;
 }
 
-tl::expected<StoredFile, Problem> JobService::result(std::string_view job_id, std::string_view name) {
-  const auto found = state_->jobs.find(job_id);
-  if (!found) return state_->missing(job_id, "job");
+tl::expected<StoredFile, Problem> JobService::result(const Caller& caller, std::string_view job_id,
+                                                     std::string_view name) {
+  const auto found = state_->jobs.find(caller.tenant, job_id);
+  if (!found) return state_->missing(caller, job_id, "job");
   const auto result = std::ranges::find(found->results, name, &Result::name);
   if (result == found->results.end()) return refuse("not-found", "The job has no result of that name.");
   return state_->stored_file(results_directory(*found) + "/" + result->name, result->media_type,
                              result->bytes, result->sha256);
 }
 
-tl::expected<std::vector<LedgerEntry>, Problem> JobService::ledger(std::string_view job_id) {
-  const auto found = job(job_id);
+tl::expected<std::vector<LedgerEntry>, Problem> JobService::ledger(const Caller& caller,
+                                                                   std::string_view job_id) {
+  const auto found = job(caller, job_id);
   if (!found) return tl::unexpected(found.error());
   return state_->deliveries.ledger(job_id);
 }
 
-tl::expected<Job, Problem> JobService::deliver_again(std::string_view job_id) {
-  if (state_->deliveries.retry(job_id)) state_->delivering.wake();
-  return job(job_id);
+tl::expected<Job, Problem> JobService::deliver_again(const Caller& caller, std::string_view job_id) {
+  const auto found = job(caller, job_id);
+  if (!found || !state_->deliveries.retry(job_id)) return found;
+  state_->delivering.wake();
+  return job(caller, job_id);
 }
 
-tl::expected<std::vector<JobEvent>, Problem> JobService::events_after(std::string_view job_id,
+tl::expected<std::vector<JobEvent>, Problem> JobService::events_after(const Caller& caller,
+                                                                      std::string_view job_id,
                                                                       std::string_view last_event_id) {
   const EventNumber after = event_number_from(last_event_id).value_or(EventNumber{});
   // Memory first: when the attempt ends in between, the store has all of its events, so none is missed.
@@ -246,7 +257,7 @@ tl::expected<std::vector<JobEvent>, Problem> JobService::events_after(std::strin
   if (const auto running = state_->running.find(job_id))
     for (const NumberedEvent& event : running->events_after(after))
       events.emplace(event.number, outside_view(event));
-  if (!state_->jobs.find(job_id)) return state_->missing(job_id, "job");
+  if (!state_->jobs.find(caller.tenant, job_id)) return state_->missing(caller, job_id, "job");
   for (const NumberedEvent& event : state_->jobs.events_after(job_id, after))
     events.emplace(event.number, outside_view(event));
 

@@ -11,6 +11,7 @@
 #include <tl/expected.hpp>
 #include <vector>
 
+#include "service/jobs/caller.h"
 #include "service/jobs/job.h"
 #include "service/jobs/pacs.h"
 #include "service/storage/incoming_file.h"
@@ -72,10 +73,11 @@ struct LedgerEntry {
 };
 
 /// The rules of uploads and jobs: everything the outside can ask for, durable before it is answered.
-/// Thread-safe; calls may block on the disk, none computes except `keep_volume`, which verifies the whole
-/// file. Problems it gives (slugs): not-found, gone, bad-id, volume-in-use, insufficient-storage,
-/// content-too-large, queue-full, not-ready, unknown-algorithm, and what the engine's `inspect` and `plan`
-/// give. Throws when the store itself fails.
+/// What is not the caller's tenant's answers like an unknown id; whether the caller has the scope that a call
+/// needs has been looked at before. Thread-safe; calls may block on the disk, none computes except
+/// `keep_volume`, which verifies the whole file. Problems it gives (slugs): not-found, gone, bad-id,
+/// volume-in-use, insufficient-storage, content-too-large, queue-full, not-ready, unknown-algorithm, and what
+/// the engine's `inspect` and `plan` give. Throws when the store itself fails.
 class JobService {
  public:
   /// Opens and recovers the store; throws std::runtime_error.
@@ -90,34 +92,38 @@ class JobService {
   const Engine& engine() const;
 
   tl::expected<IncomingFile, Problem> begin_upload(std::optional<std::int64_t> declared_bytes);
-  tl::expected<StoredVolume, Problem> keep_volume(IncomingFile file, const UploadOptions& options);
+  tl::expected<StoredVolume, Problem> keep_volume(const Caller& caller, IncomingFile file,
+                                                  const UploadOptions& options);
   /// Takes DICOM instances that a device sends to a preset; durable when it returns. When its series has been
   /// quiet for a while, a job of the preset runs on it. Gives what was in the file.
-  tl::expected<std::vector<ArrivedInstance>, Problem> receive(std::string_view preset, IncomingFile file);
+  tl::expected<std::vector<ArrivedInstance>, Problem> receive(const Caller& caller, std::string_view preset,
+                                                              IncomingFile file);
 
-  std::vector<StoredVolume> volumes();
-  tl::expected<StoredVolume, Problem> volume(std::string_view id);
-  tl::expected<StoredFile, Problem> volume_content(std::string_view id);
-  tl::expected<void, Problem> delete_volume(std::string_view id);
+  std::vector<StoredVolume> volumes(const Caller& caller);
+  tl::expected<StoredVolume, Problem> volume(const Caller& caller, std::string_view id);
+  tl::expected<StoredFile, Problem> volume_content(const Caller& caller, std::string_view id);
+  tl::expected<void, Problem> delete_volume(const Caller& caller, std::string_view id);
 
-  tl::expected<Job, Problem> submit(const JobOrder& order);
-  tl::expected<Job, Problem> job(std::string_view id);
-  tl::expected<JobPage, Problem> jobs(const JobQuery& query);
-  tl::expected<Job, Problem> cancel(std::string_view id);  ///< repeatable; a final job stays as it is
+  tl::expected<Job, Problem> submit(const Caller& caller, const JobOrder& order);
+  tl::expected<Job, Problem> job(const Caller& caller, std::string_view id);
+  tl::expected<JobPage, Problem> jobs(const Caller& caller, const JobQuery& query);
+  tl::expected<Job, Problem> cancel(const Caller& caller,
+                                    std::string_view id);  ///< repeatable; a final job stays as it is
   /// Repeatable; a running one is cancelled first. False: it is there, but `is_wanted`, which sees it as it
   /// is deleted, says no.
   tl::expected<bool, Problem> delete_job(
-      std::string_view id,
+      const Caller& caller, std::string_view id,
       const std::function<bool(const Job&)>& is_wanted = [](const Job&) { return true; });
-  tl::expected<StoredFile, Problem> result(std::string_view job_id, std::string_view name);
+  tl::expected<StoredFile, Problem> result(const Caller& caller, std::string_view job_id,
+                                           std::string_view name);
 
   /// The ledger of a job's delivery; empty until it has begun.
-  tl::expected<std::vector<LedgerEntry>, Problem> ledger(std::string_view job_id);
+  tl::expected<std::vector<LedgerEntry>, Problem> ledger(const Caller& caller, std::string_view job_id);
   /// Begins a failed delivery again, with the instances that are not stored yet; any other stays as it is.
-  tl::expected<Job, Problem> deliver_again(std::string_view job_id);
+  tl::expected<Job, Problem> deliver_again(const Caller& caller, std::string_view job_id);
 
   /// The events of a job after `last_event_id` (empty: all that are kept).
-  tl::expected<std::vector<JobEvent>, Problem> events_after(std::string_view job_id,
+  tl::expected<std::vector<JobEvent>, Problem> events_after(const Caller& caller, std::string_view job_id,
                                                             std::string_view last_event_id);
 
   /// Calls `wake` from any thread whenever the job has news, until the returned handle is dropped.

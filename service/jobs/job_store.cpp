@@ -15,7 +15,8 @@ using nlohmann::json;
 
 constexpr std::string_view kSelectJob =
     "SELECT sequence, id, state, job_order, parameters, memory_bytes, created_ms, started_ms, finished_ms, "
-    "attempt, stage, fraction, error, deaths, cancel_requested, not_before_ms, source_tries, is_long FROM "
+    "attempt, stage, fraction, error, deaths, cancel_requested, not_before_ms, source_tries, is_long, tenant "
+    "FROM "
     "jobs ";
 
 std::optional<Time> time_or_none(const Statement& row, int column) {
@@ -62,6 +63,7 @@ JobStore::Listed job_from(Database& database, const Statement& row) {
   if (job.state == JobState::kQueued && row.integer(15) > 0) job.next_attempt_at = time_of(row.integer(15));
   job.source_tries = static_cast<int>(row.integer(16));
   job.is_long = row.integer(17) != 0;
+  job.tenant = row.text(18);
   if (job.state == JobState::kSucceeded) {
     job.results = results_of(database, sequence);
     if (!job.order.destination.empty()) job.delivery = delivery_of(database, sequence);
@@ -108,11 +110,12 @@ std::string results_directory(std::string_view job_id, std::int64_t attempt) {
 int insert_row(Database& database, const Job& job) {
   return database.run(
       "INSERT INTO jobs (id, volume, method, label, state, job_order, parameters, memory_bytes, created_ms, "
-      "is_long, stage) "
-      "SELECT ?1, ?2, ?3, ?4, 'queued', ?5, ?6, ?7, ?8, ?9, 'queued' "
-      "WHERE ?2 = '' OR EXISTS (SELECT 1 FROM volumes WHERE id = ?2)",
+      "is_long, stage, tenant) "
+      "SELECT ?1, ?2, ?3, ?4, 'queued', ?5, ?6, ?7, ?8, ?9, 'queued', ?10 "
+      "WHERE ?2 = '' OR EXISTS (SELECT 1 FROM volumes WHERE id = ?2 AND tenant = ?10)",
       job.id, job.order.volume, job.order.method, job.order.label, to_json(job.order).dump(),
-      to_json(job.parameters).dump(), job.memory_bytes, milliseconds_of(job.created_at), job.is_long);
+      to_json(job.parameters).dump(), job.memory_bytes, milliseconds_of(job.created_at), job.is_long,
+      job.tenant);
 }
 
 void take_retrieved(Database& database, const std::string& job_id, const Retrieved& retrieved) {
@@ -147,16 +150,25 @@ std::optional<Job> JobStore::find(std::string_view id) {
   return database_.read([&](Database& database) { return find_in(database, id); });
 }
 
-std::vector<JobStore::Listed> JobStore::list(const JobQuery& query, std::optional<std::int64_t> before) {
+std::optional<Job> JobStore::find(std::string_view tenant, std::string_view id) {
+  return database_.read([&](Database& database) -> std::optional<Job> {
+    Statement row = database.query(std::string(kSelectJob) + "WHERE id = ? AND tenant = ?", id, tenant);
+    if (!row.step()) return std::nullopt;
+    return job_from(database, row).job;
+  });
+}
+
+std::vector<JobStore::Listed> JobStore::list(std::string_view tenant, const JobQuery& query,
+                                             std::optional<std::int64_t> before) {
   return database_.read([&](Database& database) {
     std::optional<std::string_view> state;
     if (query.state) state = name_of(*query.state);
     // A condition whose value is absent holds for every row.
-    Statement rows = database.query(
-        std::string(kSelectJob) +
-            "WHERE (?1 IS NULL OR state = ?1) AND (?2 = '' OR method = ?2) AND (?3 = '' OR label = ?3) "
-            "AND (?4 IS NULL OR sequence < ?4) ORDER BY sequence DESC LIMIT ?5",
-        state, query.method, query.label, before, query.limit + 1);
+    Statement rows = database.query(std::string(kSelectJob) +
+                                        "WHERE tenant = ?6 AND (?1 IS NULL OR state = ?1) AND (?2 = '' OR "
+                                        "method = ?2) AND (?3 = '' OR label = ?3) "
+                                        "AND (?4 IS NULL OR sequence < ?4) ORDER BY sequence DESC LIMIT ?5",
+                                    state, query.method, query.label, before, query.limit + 1, tenant);
     return all_of(std::move(rows), [&](const Statement& row) { return job_from(database, row); });
   });
 }
@@ -248,7 +260,7 @@ std::optional<JobStore::Removal> JobStore::remove(std::string_view id,
     }
     auto arrived_files = forget_arrivals(database, id);
     database.run("DELETE FROM jobs WHERE id = ?", id);
-    bury(database, id);
+    bury(database, id, job->tenant);
     audit(database, id, "job deleted");
     return Removal{*std::move(job), was_final, true, std::move(arrived_files)};
   });

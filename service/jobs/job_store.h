@@ -47,12 +47,14 @@ class JobStore {
       const Job& job, int max_queued, const std::function<void(Database&)>& also = [](Database&) {});
 
   std::optional<Job> find(std::string_view id);
-  /// Newest first, at most `query.limit` + 1 of those older than `before` (a sequence number).
+  std::optional<Job> find(std::string_view tenant, std::string_view id);
+  /// Of the tenant, newest first, at most `query.limit` + 1 of those older than `before` (a sequence number).
   struct Listed {
     Job job;
     std::int64_t sequence;
   };
-  std::vector<Listed> list(const JobQuery& query, std::optional<std::int64_t> before);
+  std::vector<Listed> list(std::string_view tenant, const JobQuery& query,
+                           std::optional<std::int64_t> before);
 
   /// What is to be done for a queued job: fetch its series, or compute.
   enum class Work { kRetrieve, kCompute };

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "algorithms/progress.h"
+#include "service/jobs/caller.h"
 #include "service/jobs/job.h"
 #include "service/storage/incoming_file.h"
 
@@ -39,7 +40,8 @@ struct Preset {
   JobOrder order;  ///< without its volume
   /// A series is whole when nothing of it has arrived for so long.
   std::chrono::milliseconds quiet = std::chrono::seconds(10);
-  std::string aet = {};  ///< the AE title that devices call it by; empty: none
+  std::string aet = {};                 ///< the AE title that devices call it by; empty: none
+  std::string tenant = kDefaultTenant;  ///< whose the series are that come by C-STORE
 };
 
 /// The DICOM nodes and presets that the configuration names, handed to the service by main as plain functions

@@ -97,7 +97,7 @@ void JobService::State::check_presets() const {
 /// Files that no row points to: what was being written, or deleted, when the last daemon ended.
 void JobService::State::sweep() {
   std::set<std::string, std::less<>> wanted = jobs.results_directories();
-  for (const StoredVolume& volume : volumes.all()) wanted.insert(volume_file(volume.id));
+  for (const std::string& id : volumes.ids()) wanted.insert(volume_file(id));
   for (const std::string& file : arrivals.files()) wanted.insert(file);
   for (const std::string folder : {"volumes", "results", "arrivals"})
     files.sweep(folder,
@@ -167,11 +167,12 @@ WorkerPool::Work JobService::State::claim_arrivals() {
 }
 
 /// Its arrivals wait until the queue has room.
-void JobService::State::start_job_of(const Preset& preset, const DicomSource& series) {
+void JobService::State::start_job_of(const Preset& preset, const ArrivalStore::QuietSeries& series) {
   Job job;
   job.id = new_id("j-");
+  job.tenant = series.tenant;
   job.order = preset.order;
-  job.order.source = series;
+  job.order.source = series.source;
   job.parameters = job.order.parameters;
   job.progress.stage = "queued";
   job.created_at = now_in_milliseconds();
@@ -203,17 +204,19 @@ tl::expected<VolumeFacts, Problem> JobService::State::verify(const std::filesyst
   }
 }
 
-tl::unexpected<Problem> JobService::State::missing(std::string_view id, std::string_view what) {
+tl::unexpected<Problem> JobService::State::missing(const Caller& caller, std::string_view id,
+                                                   std::string_view what) {
   const std::string name(what);
   if (!is_id_shaped(id))
     return refuse("bad-id", "This is not the id of a " + name + "; use the id that its creation gave.");
-  if (database.read([&](Database& reader) { return is_buried(reader, id); }))
+  if (database.read([&](Database& reader) { return is_buried(reader, id, caller.tenant); }))
     return refuse("gone", "This " + name + " was deleted.");
   return refuse("not-found", "There is no such " + name + ".");
 }
 
-tl::expected<void, Problem> JobService::State::unless_gone(std::string_view id, std::string_view what) {
-  auto reason = missing(id, what);
+tl::expected<void, Problem> JobService::State::unless_gone(const Caller& caller, std::string_view id,
+                                                           std::string_view what) {
+  auto reason = missing(caller, id, what);
   if (reason.value().slug == "gone") return {};
   return reason;
 }

@@ -40,17 +40,17 @@ struct JobService::State {
 
   // What devices send to presets.
   WorkerPool::Work claim_arrivals();  ///< of a series that has become whole: makes its job
-  void start_job_of(const Preset& preset, const DicomSource& series);
+  void start_job_of(const Preset& preset, const ArrivalStore::QuietSeries& series);
   void forget_arrivals(const Job& job);  ///< when it needs them no more
 
   // Answers.
   /// What the engine says of an upload; not-ready when the service is stopped meanwhile.
   tl::expected<VolumeFacts, Problem> verify(const std::filesystem::path& file,
                                             const UploadOptions& options) const;
-  /// Why there is nothing of that id: bad-id, gone or not-found.
-  tl::unexpected<Problem> missing(std::string_view id, std::string_view what);
+  /// Why there is nothing of that id for the caller: bad-id, gone or not-found.
+  tl::unexpected<Problem> missing(const Caller& caller, std::string_view id, std::string_view what);
   /// The same, but deleted is what it should be.
-  tl::expected<void, Problem> unless_gone(std::string_view id, std::string_view what);
+  tl::expected<void, Problem> unless_gone(const Caller& caller, std::string_view id, std::string_view what);
   Job with_progress(Job job) const;
   tl::expected<void, Problem> check(const JobOrder& order) const;
   tl::expected<void, Problem> check_nodes(const JobOrder& order) const;

@@ -59,6 +59,7 @@ tl::expected<StoredVolume, NodeFailure> SourceRunner::retrieve(ClaimedJob& claim
 
   StoredVolume volume;
   volume.id = new_id("v-");
+  volume.tenant = claim.job().tenant;
   volume.options.series = source.series;
   volume.sha256 = file.finish();
   volume.bytes = file.bytes();

@@ -124,8 +124,21 @@ constexpr const char* kLongJobs = R"(
   ALTER TABLE jobs ADD COLUMN is_long INTEGER NOT NULL DEFAULT 0;
 )";
 
+/// Everything is somebody's. What devices send for different tenants never makes one series.
+constexpr const char* kTenants = R"(
+  ALTER TABLE volumes ADD COLUMN tenant TEXT NOT NULL DEFAULT 'default';
+  ALTER TABLE jobs ADD COLUMN tenant TEXT NOT NULL DEFAULT 'default';
+  ALTER TABLE tombstones ADD COLUMN tenant TEXT NOT NULL DEFAULT 'default';
+  ALTER TABLE arrivals ADD COLUMN tenant TEXT NOT NULL DEFAULT 'default';
+  CREATE INDEX volumes_by_tenant ON volumes (tenant, sequence);
+  CREATE INDEX jobs_by_tenant ON jobs (tenant, sequence);
+  DROP INDEX waiting_arrivals;
+  CREATE UNIQUE INDEX waiting_arrivals ON arrivals (preset, tenant, study, series, sop_instance_uid)
+    WHERE job IS NULL;
+)";
+
 /// What makes each version of the schema of the one before.
-constexpr std::array kVersions = {kFirstSchema, kIndexByState, kNodes, kLongJobs};
+constexpr std::array kVersions = {kFirstSchema, kIndexByState, kNodes, kLongJobs, kTenants};
 constexpr std::size_t kNewestVersion = kVersions.size();
 
 std::size_t schema_version(Database& database) {
@@ -178,13 +191,13 @@ void audit(Database& database, std::string_view subject, std::string_view action
                milliseconds_of(now_in_milliseconds()), subject, action);
 }
 
-void bury(Database& database, std::string_view id) {
-  database.run("INSERT INTO tombstones (id, deleted_ms) VALUES (?, ?)", id,
-               milliseconds_of(now_in_milliseconds()));
+void bury(Database& database, std::string_view id, std::string_view tenant) {
+  database.run("INSERT INTO tombstones (id, deleted_ms, tenant) VALUES (?, ?, ?)", id,
+               milliseconds_of(now_in_milliseconds()), tenant);
 }
 
-bool is_buried(Database& database, std::string_view id) {
-  return database.query("SELECT 1 FROM tombstones WHERE id = ?", id).step();
+bool is_buried(Database& database, std::string_view id, std::string_view tenant) {
+  return database.query("SELECT 1 FROM tombstones WHERE id = ? AND tenant = ?", id, tenant).step();
 }
 
 std::int64_t milliseconds_of(Time time) {

@@ -58,8 +58,8 @@ class StoreDatabase {
 // The pieces that volumes and jobs share. Those that write belong into the caller's transaction.
 
 void audit(Database& database, std::string_view subject, std::string_view action);
-void bury(Database& database, std::string_view id);  ///< leaves a tombstone
-bool is_buried(Database& database, std::string_view id);
+void bury(Database& database, std::string_view id, std::string_view tenant);  ///< leaves a tombstone
+bool is_buried(Database& database, std::string_view id, std::string_view tenant);
 
 /// Times are kept as milliseconds since 1970 UTC.
 std::int64_t milliseconds_of(Time time);

@@ -5,6 +5,9 @@
 namespace volsmooth {
 namespace {
 
+constexpr std::string_view kSelectVolume =
+    "SELECT id, options, facts, bytes, sha256, created_ms, tenant FROM volumes ";
+
 StoredVolume volume_from(const Statement& row) {
   StoredVolume volume;
   volume.id = row.text(0);
@@ -13,6 +16,7 @@ StoredVolume volume_from(const Statement& row) {
   volume.bytes = row.integer(3);
   volume.sha256 = row.text(4);
   volume.created_at = time_of(row.integer(5));
+  volume.tenant = row.text(6);
   return volume;
 }
 
@@ -21,39 +25,45 @@ StoredVolume volume_from(const Statement& row) {
 int insert_volume(Database& database, const StoredVolume& volume) {
   audit(database, volume.id, "volume stored");
   return database.run(
-      "INSERT INTO volumes (id, options, facts, bytes, sha256, created_ms) VALUES (?, ?, ?, ?, ?, ?)",
+      "INSERT INTO volumes (id, options, facts, bytes, sha256, created_ms, tenant) VALUES (?, ?, ?, ?, ?, ?, "
+      "?)",
       volume.id, options_to_json(volume.options).dump(), facts_to_json(volume.facts).dump(), volume.bytes,
-      volume.sha256, milliseconds_of(volume.created_at));
+      volume.sha256, milliseconds_of(volume.created_at), volume.tenant);
 }
 
-std::optional<StoredVolume> VolumeStore::find(std::string_view id) {
+std::optional<StoredVolume> VolumeStore::find(std::string_view tenant, std::string_view id) {
   return database_.read([&](Database& database) -> std::optional<StoredVolume> {
-    Statement row =
-        database.query("SELECT id, options, facts, bytes, sha256, created_ms FROM volumes WHERE id = ?", id);
+    Statement row = database.query(std::string(kSelectVolume) + "WHERE id = ? AND tenant = ?", id, tenant);
     if (!row.step()) return std::nullopt;
     return volume_from(row);
   });
 }
 
-std::vector<StoredVolume> VolumeStore::all() {
-  return database_.read([](Database& database) {
+std::vector<StoredVolume> VolumeStore::of_tenant(std::string_view tenant) {
+  return database_.read([&](Database& database) {
     return all_of(
-        database.query(
-            "SELECT id, options, facts, bytes, sha256, created_ms FROM volumes ORDER BY sequence DESC"),
+        database.query(std::string(kSelectVolume) + "WHERE tenant = ? ORDER BY sequence DESC", tenant),
         volume_from);
   });
 }
 
-VolumeStore::Removal VolumeStore::remove(std::string_view id) {
+std::vector<std::string> VolumeStore::ids() {
+  return database_.read([](Database& database) {
+    return all_of(database.query("SELECT id FROM volumes"), [](const Statement& row) { return row.text(0); });
+  });
+}
+
+VolumeStore::Removal VolumeStore::remove(std::string_view tenant, std::string_view id) {
   return database_.write([&](Database& database) {
     const int removed = database.run(
-        "DELETE FROM volumes WHERE id = ?1 AND NOT EXISTS "
+        "DELETE FROM volumes WHERE id = ?1 AND tenant = ?2 AND NOT EXISTS "
         "(SELECT 1 FROM jobs WHERE volume = ?1 AND state IN ('queued', 'running'))",
-        id);
+        id, tenant);
     if (removed == 0)
-      return database.query("SELECT 1 FROM volumes WHERE id = ?", id).step() ? Removal::kInUse
-                                                                             : Removal::kUnknown;
-    bury(database, id);
+      return database.query("SELECT 1 FROM volumes WHERE id = ? AND tenant = ?", id, tenant).step()
+                 ? Removal::kInUse
+                 : Removal::kUnknown;
+    bury(database, id, tenant);
     audit(database, id, "volume deleted");
     return Removal::kDone;
   });

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -19,11 +20,13 @@ class VolumeStore {
   void insert(const StoredVolume& volume) {
     database_.write([&](Database& database) { return insert_volume(database, volume); });
   }
-  std::optional<StoredVolume> find(std::string_view id);
-  std::vector<StoredVolume> all();  ///< newest first
+  std::optional<StoredVolume> find(std::string_view tenant, std::string_view id);
+  std::vector<StoredVolume> of_tenant(std::string_view tenant);  ///< newest first
+  std::vector<std::string> ids();                                ///< of all tenants
 
   enum class Removal { kDone, kInUse, kUnknown };
-  Removal remove(std::string_view id);  ///< unless an unfinished job needs it
+  /// Unless an unfinished job needs it.
+  Removal remove(std::string_view tenant, std::string_view id);
 
  private:
   StoreDatabase& database_;

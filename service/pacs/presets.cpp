@@ -58,8 +58,13 @@ Preset preset_from(const std::string& name, const json& configured) {
       if (!value.is_string() || !is_ae_title(value.get_ref<const std::string&>()))
         refuse_preset(name, std::string("'aet' must be ") + kAeTitleRule);
       preset.aet = value;
+    } else if (member == "tenant") {
+      if (!value.is_string() || !is_id_shaped(value.get_ref<const std::string&>()))
+        refuse_preset(name, "'tenant' must be 1 to 64 letters, digits, '-' and '_'");
+      preset.tenant = value;
     } else if (member != "job") {
-      refuse_preset(name, "'" + member + "' is not known; known are job, destination, quiet_seconds and aet");
+      refuse_preset(
+          name, "'" + member + "' is not known; known are job, destination, quiet_seconds, aet and tenant");
     }
   }
   return preset;

@@ -31,7 +31,7 @@ TEST_F(JobServiceTest, AnUploadIsKeptWithItsDigest) {
   // FIPS 180-2, appendix B.1: SHA-256 of "abc".
   EXPECT_EQ(stored->sha256, "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
   EXPECT_EQ(stored->bytes, 3);
-  const auto content = service_->volume_content(stored->id).value();
+  const auto content = service_->volume_content(kAnyone, stored->id).value();
   EXPECT_EQ(digest_of(content.path).sha256, stored->sha256);
   EXPECT_EQ(content.bytes, 3);
 }
@@ -39,7 +39,7 @@ TEST_F(JobServiceTest, AnUploadIsKeptWithItsDigest) {
 TEST_F(JobServiceTest, ARefusedUploadLeavesNothingBehind) {
   open();
   EXPECT_EQ(slug_of(upload(*service_, "bad bytes")), "nifti-bad-header");
-  EXPECT_TRUE(service_->volumes().empty());
+  EXPECT_TRUE(service_->volumes(kAnyone).empty());
   EXPECT_TRUE(names_in(scratch_.path() / "data/tmp").empty());
   EXPECT_TRUE(names_in(scratch_.path() / "data/volumes").empty());
 }
@@ -47,7 +47,7 @@ TEST_F(JobServiceTest, ARefusedUploadLeavesNothingBehind) {
 TEST_F(JobServiceTest, FactsComeBackBitForBit) {
   open();
   const auto stored = upload(*service_, "x").value();
-  const auto found = service_->volume(stored.id).value();
+  const auto found = service_->volume(kAnyone, stored.id).value();
   EXPECT_EQ(found.facts.spacing_mm, stored.facts.spacing_mm);
   EXPECT_EQ(found.facts.affine, stored.facts.affine);
   EXPECT_EQ(found.created_at, stored.created_at);
@@ -56,16 +56,16 @@ TEST_F(JobServiceTest, FactsComeBackBitForBit) {
 TEST_F(JobServiceTest, AJobRunsToItsResults) {
   open_and_start();
   const auto volume = upload(*service_, "voxels").value();
-  const Job job = wait_for(*service_, service_->submit(order_for(volume.id)).value().id);
+  const Job job = wait_for(*service_, service_->submit(kAnyone, order_for(volume.id)).value().id);
   ASSERT_EQ(job.state, JobState::kSucceeded);
   ASSERT_EQ(job.results.size(), 2u);
   EXPECT_EQ(job.progress.fraction, 1);
   EXPECT_EQ(job.progress.stage, "done");
-  const auto file = service_->result(job.id, "out.nii.gz").value();
+  const auto file = service_->result(kAnyone, job.id, "out.nii.gz").value();
   EXPECT_EQ(file.sha256, volume.sha256);
   EXPECT_EQ(digest_of(file.path).sha256, volume.sha256);
   EXPECT_EQ(file.bytes, 6);
-  EXPECT_EQ(slug_of(service_->result(job.id, "../volsmooth.db")), "not-found");
+  EXPECT_EQ(slug_of(service_->result(kAnyone, job.id, "../volsmooth.db")), "not-found");
 }
 
 TEST_F(JobServiceTest, EveryWayToFailHasItsReasonAndLeavesNoFiles) {
@@ -76,7 +76,7 @@ TEST_F(JobServiceTest, EveryWayToFailHasItsReasonAndLeavesNoFiles) {
                                                       {"full", "insufficient-storage"},
                                                       {"problem", "bad-parameter"}};
   for (const auto& [label, slug] : ways) {
-    const Job job = wait_for(*service_, service_->submit(order_for(volume.id, label)).value().id);
+    const Job job = wait_for(*service_, service_->submit(kAnyone, order_for(volume.id, label)).value().id);
     EXPECT_EQ(job.state, JobState::kFailed) << label;
     ASSERT_TRUE(job.error) << label;
     EXPECT_EQ(job.error->slug, slug) << label;
@@ -89,7 +89,7 @@ TEST_F(JobServiceTest, AVolumeThatChangedOnTheDiskIsNotComputed) {
   open_and_start();
   const auto volume = upload(*service_, "voxels").value();
   std::ofstream(scratch_.path() / "data/volumes" / volume.id) << "vOxels";
-  const Job job = wait_for(*service_, service_->submit(order_for(volume.id)).value().id);
+  const Job job = wait_for(*service_, service_->submit(kAnyone, order_for(volume.id)).value().id);
   ASSERT_EQ(job.state, JobState::kFailed);
   EXPECT_EQ(job.error->slug, "integrity-failure");
   EXPECT_EQ(fake_.computed, 0);
@@ -98,40 +98,40 @@ TEST_F(JobServiceTest, AVolumeThatChangedOnTheDiskIsNotComputed) {
 TEST_F(JobServiceTest, AResultOfAnotherSizeIsNotGivenOut) {
   open_and_start();
   const auto volume = upload(*service_, "voxels").value();
-  const Job job = wait_for(*service_, service_->submit(order_for(volume.id)).value().id);
-  std::ofstream(service_->result(job.id, "out.nii.gz").value().path, std::ios::app) << "x";
-  EXPECT_EQ(slug_of(service_->result(job.id, "out.nii.gz")), "integrity-failure");
-  EXPECT_EQ(slug_of(service_->result(job.id, "report.json")), "none");
+  const Job job = wait_for(*service_, service_->submit(kAnyone, order_for(volume.id)).value().id);
+  std::ofstream(service_->result(kAnyone, job.id, "out.nii.gz").value().path, std::ios::app) << "x";
+  EXPECT_EQ(slug_of(service_->result(kAnyone, job.id, "out.nii.gz")), "integrity-failure");
+  EXPECT_EQ(slug_of(service_->result(kAnyone, job.id, "report.json")), "none");
 }
 
 TEST_F(JobServiceTest, IdsAreUnknownGoneOrNoIds) {
   open();
   for (const char* id : {"j-aaaaaaaaaaaaaaaa", "nonexistent", "0"}) {
-    EXPECT_EQ(slug_of(service_->job(id)), "not-found");
-    EXPECT_EQ(slug_of(service_->volume(id)), "not-found");
-    EXPECT_EQ(slug_of(service_->delete_job(id)), "not-found");
-    EXPECT_EQ(slug_of(service_->cancel(id)), "not-found");
-    EXPECT_EQ(slug_of(service_->events_after(id, "")), "not-found");
-    EXPECT_EQ(slug_of(service_->result(id, "x")), "not-found");
+    EXPECT_EQ(slug_of(service_->job(kAnyone, id)), "not-found");
+    EXPECT_EQ(slug_of(service_->volume(kAnyone, id)), "not-found");
+    EXPECT_EQ(slug_of(service_->delete_job(kAnyone, id)), "not-found");
+    EXPECT_EQ(slug_of(service_->cancel(kAnyone, id)), "not-found");
+    EXPECT_EQ(slug_of(service_->events_after(kAnyone, id, "")), "not-found");
+    EXPECT_EQ(slug_of(service_->result(kAnyone, id, "x")), "not-found");
   }
   for (const std::string id : {"", "../x", "' OR 1=1 --", "a b", "caf\xC3\xA9"}) {
-    EXPECT_EQ(slug_of(service_->job(id)), "bad-id");
-    EXPECT_EQ(slug_of(service_->delete_volume(id)), "bad-id");
+    EXPECT_EQ(slug_of(service_->job(kAnyone, id)), "bad-id");
+    EXPECT_EQ(slug_of(service_->delete_volume(kAnyone, id)), "bad-id");
   }
 }
 
 TEST_F(JobServiceTest, WhatWasDeletedIsGoneAndMayBeDeletedAgain) {
   open_and_start();
   const auto volume = upload(*service_, "x").value();
-  const Job job = wait_for(*service_, service_->submit(order_for(volume.id)).value().id);
+  const Job job = wait_for(*service_, service_->submit(kAnyone, order_for(volume.id)).value().id);
   for (int time = 0; time < 2; ++time) {
-    EXPECT_TRUE(service_->delete_job(job.id));
-    EXPECT_TRUE(service_->delete_volume(volume.id));
+    EXPECT_TRUE(service_->delete_job(kAnyone, job.id));
+    EXPECT_TRUE(service_->delete_volume(kAnyone, volume.id));
   }
-  EXPECT_EQ(slug_of(service_->job(job.id)), "gone");
-  EXPECT_EQ(slug_of(service_->cancel(job.id)), "gone");
-  EXPECT_EQ(slug_of(service_->volume_content(volume.id)), "gone");
-  EXPECT_EQ(slug_of(service_->submit(order_for(volume.id))), "not-found");
+  EXPECT_EQ(slug_of(service_->job(kAnyone, job.id)), "gone");
+  EXPECT_EQ(slug_of(service_->cancel(kAnyone, job.id)), "gone");
+  EXPECT_EQ(slug_of(service_->volume_content(kAnyone, volume.id)), "gone");
+  EXPECT_EQ(slug_of(service_->submit(kAnyone, order_for(volume.id))), "not-found");
   EXPECT_TRUE(names_in(scratch_.path() / "data/results").empty());
   EXPECT_TRUE(names_in(scratch_.path() / "data/volumes").empty());
 }
@@ -141,39 +141,39 @@ TEST_F(JobServiceTest, ABadOrderNeverBecomesAJob) {
   const std::string volume = upload(*service_, "x").value().id;
   JobOrder order = order_for(volume);
   order.method = "magic";
-  EXPECT_EQ(slug_of(service_->submit(order)), "unknown-algorithm");
+  EXPECT_EQ(slug_of(service_->submit(kAnyone, order)), "unknown-algorithm");
   order = order_for(volume);
   order.mesh_formats = {"step"};
-  EXPECT_EQ(slug_of(service_->submit(order)), "bad-parameter");
+  EXPECT_EQ(slug_of(service_->submit(kAnyone, order)), "bad-parameter");
   order = order_for(volume);
   order.parameters["steps"] = 5.0;
-  EXPECT_EQ(slug_of(service_->submit(order)), "unknown-field");
+  EXPECT_EQ(slug_of(service_->submit(kAnyone, order)), "unknown-field");
   order = order_for(volume);
   order.isovalues = {std::numeric_limits<double>::infinity()};
-  EXPECT_EQ(slug_of(service_->submit(order)), "bad-parameter");
-  EXPECT_EQ(slug_of(service_->submit(order_for("v-unknown"))), "not-found");
-  EXPECT_EQ(slug_of(service_->submit(order_for("../x"))), "bad-id");
+  EXPECT_EQ(slug_of(service_->submit(kAnyone, order)), "bad-parameter");
+  EXPECT_EQ(slug_of(service_->submit(kAnyone, order_for("v-unknown"))), "not-found");
+  EXPECT_EQ(slug_of(service_->submit(kAnyone, order_for("../x"))), "bad-id");
   EXPECT_EQ(service_->statistics().jobs_total, 0);
 }
 
 TEST_F(JobServiceTest, AQueuedJobIsCancelledAtOnceAndStaysSo) {
   open();
   const auto volume = upload(*service_, "x").value();
-  const std::string id = service_->submit(order_for(volume.id)).value().id;
-  EXPECT_EQ(slug_of(service_->delete_volume(volume.id)), "volume-in-use");
-  EXPECT_EQ(service_->cancel(id)->state, JobState::kCancelled);
-  EXPECT_EQ(service_->cancel(id)->state, JobState::kCancelled);
+  const std::string id = service_->submit(kAnyone, order_for(volume.id)).value().id;
+  EXPECT_EQ(slug_of(service_->delete_volume(kAnyone, volume.id)), "volume-in-use");
+  EXPECT_EQ(service_->cancel(kAnyone, id)->state, JobState::kCancelled);
+  EXPECT_EQ(service_->cancel(kAnyone, id)->state, JobState::kCancelled);
   service_->start();
-  EXPECT_EQ(service_->job(id)->state, JobState::kCancelled);
-  EXPECT_TRUE(service_->delete_volume(volume.id));
+  EXPECT_EQ(service_->job(kAnyone, id)->state, JobState::kCancelled);
+  EXPECT_TRUE(service_->delete_volume(kAnyone, volume.id));
 }
 
 TEST_F(JobServiceTest, ARunningJobEndsWhenItIsCancelled) {
   open_and_start();
   const auto volume = upload(*service_, "x").value();
-  const std::string id = service_->submit(order_for(volume.id, "gate")).value().id;
+  const std::string id = service_->submit(kAnyone, order_for(volume.id, "gate")).value().id;
   wait_for(*service_, id, JobState::kRunning);
-  EXPECT_TRUE(service_->cancel(id));
+  EXPECT_TRUE(service_->cancel(kAnyone, id));
   EXPECT_EQ(wait_for(*service_, id).state, JobState::kCancelled);
   EXPECT_EQ(fake_.computed, 0);
 }
@@ -188,10 +188,10 @@ TEST_F(JobServiceTest, ADeletedRunningJobIsCountedAsCancelledAndLeavesNothing) {
   });
   service_->start();
   const auto volume = upload(*service_, "x").value();
-  const std::string id = service_->submit(order_for(volume.id, "gate")).value().id;
+  const std::string id = service_->submit(kAnyone, order_for(volume.id, "gate")).value().id;
   wait_for(*service_, id, JobState::kRunning);
-  EXPECT_TRUE(service_->delete_job(id));
-  EXPECT_EQ(slug_of(service_->job(id)), "gone");
+  EXPECT_TRUE(service_->delete_job(kAnyone, id));
+  EXPECT_EQ(slug_of(service_->job(kAnyone, id)), "gone");
   service_->stop();
   EXPECT_EQ(finals, std::vector<JobState>{JobState::kCancelled});
   EXPECT_TRUE(names_in(scratch_.path() / "data/results").empty());
@@ -209,10 +209,10 @@ TEST_F(JobServiceTest, CancelAndResultNeverBothHappen) {
   service_->start();
   const auto volume = upload(*service_, "x").value();
   std::vector<std::string> ids;
-  for (int i = 0; i < 30; ++i) ids.push_back(service_->submit(order_for(volume.id)).value().id);
+  for (int i = 0; i < 30; ++i) ids.push_back(service_->submit(kAnyone, order_for(volume.id)).value().id);
   std::vector<std::jthread> clients;
   for (const std::string& id : ids)
-    clients.emplace_back([&service = *service_, id] { EXPECT_TRUE(service.cancel(id)); });
+    clients.emplace_back([&service = *service_, id] { EXPECT_TRUE(service.cancel(kAnyone, id)); });
   clients.clear();
   std::set<std::string> expected_files;
   for (const std::string& id : ids) {
@@ -232,13 +232,13 @@ TEST_F(JobServiceTest, JobsRunSideBySideAsFarAsMemoryGoes) {
   const auto volume = upload(*service_, "x").value();
   std::vector<std::string> ids;
   fake_.memory_bytes = 51;
-  for (int i = 0; i < 4; ++i) ids.push_back(service_->submit(order_for(volume.id)).value().id);
+  for (int i = 0; i < 4; ++i) ids.push_back(service_->submit(kAnyone, order_for(volume.id)).value().id);
   for (const std::string& id : ids) wait_for(*service_, id);
   EXPECT_EQ(fake_.most_computing, 1);
 
   fake_.memory_bytes = 50;
-  ids = {service_->submit(order_for(volume.id, "gate")).value().id,
-         service_->submit(order_for(volume.id, "gate")).value().id};
+  ids = {service_->submit(kAnyone, order_for(volume.id, "gate")).value().id,
+         service_->submit(kAnyone, order_for(volume.id, "gate")).value().id};
   while (fake_.computing < 2) std::this_thread::yield();
   fake_.open_gate();
   for (const std::string& id : ids) wait_for(*service_, id);
@@ -249,13 +249,14 @@ TEST_F(JobServiceTest, AJobOfSecondsNeedNotWaitForLongOnes) {
   open_and_start();
   const auto volume = upload(*service_, "x").value();
   std::vector<std::string> long_ones;
-  for (int i = 0; i < 3; ++i) long_ones.push_back(service_->submit(order_for(volume.id, "gate")).value().id);
+  for (int i = 0; i < 3; ++i)
+    long_ones.push_back(service_->submit(kAnyone, order_for(volume.id, "gate")).value().id);
   while (fake_.at_gate < 2) std::this_thread::yield();
   for (int i = 0; i < 2; ++i) {
-    const std::string id = service_->submit(order_for(volume.id)).value().id;
+    const std::string id = service_->submit(kAnyone, order_for(volume.id)).value().id;
     EXPECT_EQ(wait_for(*service_, id).state, JobState::kSucceeded);
   }
-  EXPECT_EQ(service_->job(long_ones[2]).value().state, JobState::kQueued);
+  EXPECT_EQ(service_->job(kAnyone, long_ones[2]).value().state, JobState::kQueued);
   fake_.open_gate();
   for (const std::string& id : long_ones) EXPECT_EQ(wait_for(*service_, id).state, JobState::kSucceeded);
 }
@@ -264,13 +265,13 @@ TEST_F(JobServiceTest, NorForALongOneThatWaitsForTheMemoryOfAnother) {
   open_and_start();
   const auto volume = upload(*service_, "x").value();
   fake_.memory_bytes = 60;
-  const std::string runs = service_->submit(order_for(volume.id, "gate")).value().id;
+  const std::string runs = service_->submit(kAnyone, order_for(volume.id, "gate")).value().id;
   while (fake_.at_gate < 1) std::this_thread::yield();
-  const std::string waits = service_->submit(order_for(volume.id, "gate")).value().id;
+  const std::string waits = service_->submit(kAnyone, order_for(volume.id, "gate")).value().id;
   fake_.memory_bytes = 30;
-  const std::string quick = service_->submit(order_for(volume.id)).value().id;
+  const std::string quick = service_->submit(kAnyone, order_for(volume.id)).value().id;
   EXPECT_EQ(wait_for(*service_, quick).state, JobState::kSucceeded);
-  EXPECT_EQ(service_->job(waits).value().state, JobState::kQueued);
+  EXPECT_EQ(service_->job(kAnyone, waits).value().state, JobState::kQueued);
   fake_.open_gate();
   for (const std::string& id : {runs, waits}) EXPECT_EQ(wait_for(*service_, id).state, JobState::kSucceeded);
 }
@@ -279,7 +280,7 @@ TEST_F(JobServiceTest, AJobLargerThanTheLimitRunsAlone) {
   open_and_start();
   const auto volume = upload(*service_, "x").value();
   fake_.memory_bytes = 1000;
-  EXPECT_EQ(wait_for(*service_, service_->submit(order_for(volume.id)).value().id).state,
+  EXPECT_EQ(wait_for(*service_, service_->submit(kAnyone, order_for(volume.id)).value().id).state,
             JobState::kSucceeded);
 }
 
@@ -289,39 +290,39 @@ TEST_F(JobServiceTest, PagesGoFromTheNewestToTheOldestWithoutGaps) {
   std::vector<std::string> newest_first;
   for (int i = 0; i < 7; ++i)
     newest_first.insert(newest_first.begin(),
-                        service_->submit(order_for(volume.id, i % 2 ? "odd" : "even")).value().id);
+                        service_->submit(kAnyone, order_for(volume.id, i % 2 ? "odd" : "even")).value().id);
   JobQuery query;
   query.limit = 3;
   std::vector<std::string> seen;
   do {
-    const JobPage page = service_->jobs(query).value();
+    const JobPage page = service_->jobs(kAnyone, query).value();
     for (const Job& job : page.jobs) seen.push_back(job.id);
     query.cursor = page.next_cursor;
-    service_->submit(order_for(volume.id));  // newer ones do not disturb
+    service_->submit(kAnyone, order_for(volume.id));  // newer ones do not disturb
   } while (!query.cursor.empty());
   EXPECT_EQ(seen, newest_first);
 
   JobQuery odd;
   odd.label = "odd";
-  EXPECT_EQ(service_->jobs(odd)->jobs.size(), 3u);
+  EXPECT_EQ(service_->jobs(kAnyone, odd)->jobs.size(), 3u);
   odd.state = JobState::kRunning;
-  EXPECT_TRUE(service_->jobs(odd)->jobs.empty());
+  EXPECT_TRUE(service_->jobs(kAnyone, odd)->jobs.empty());
   for (const char* cursor : {"x", "1x", "99999999999999999999"}) {
     query.cursor = cursor;
-    EXPECT_EQ(slug_of(service_->jobs(query)), "bad-query");
+    EXPECT_EQ(slug_of(service_->jobs(kAnyone, query)), "bad-query");
   }
 }
 
 TEST_F(JobServiceTest, ResumingGivesExactlyTheLaterEvents) {
   open_and_start();
   const auto volume = upload(*service_, "x").value();
-  const Job job = wait_for(*service_, service_->submit(order_for(volume.id)).value().id);
-  const auto all = service_->events_after(job.id, "").value();
+  const Job job = wait_for(*service_, service_->submit(kAnyone, order_for(volume.id)).value().id);
+  const auto all = service_->events_after(kAnyone, job.id, "").value();
   ASSERT_GE(all.size(), 5u);
   EXPECT_EQ(all.front().kind, "state");
   EXPECT_NE(all.back().data.find("succeeded"), std::string::npos);
   for (std::size_t i = 0; i < all.size(); ++i) {
-    const auto later = service_->events_after(job.id, all[i].id).value();
+    const auto later = service_->events_after(kAnyone, job.id, all[i].id).value();
     ASSERT_EQ(later.size(), all.size() - i - 1);
     for (std::size_t k = 0; k < later.size(); ++k) EXPECT_EQ(later[k].id, all[i + 1 + k].id);
   }
@@ -332,14 +333,14 @@ TEST_F(JobServiceTest, FollowingAJobMissesNothing) {
   open_and_start();
   const auto volume = upload(*service_, "x").value();
   for (int round = 0; round < 10; ++round) {
-    const std::string id = service_->submit(order_for(volume.id)).value().id;
+    const std::string id = service_->submit(kAnyone, order_for(volume.id)).value().id;
     std::vector<std::string> followed, all;
     JobEvent last;
     while (last.data.find("succeeded") == std::string::npos) {
-      const auto news = service_->events_after(id, last.id).value();
+      const auto news = service_->events_after(kAnyone, id, last.id).value();
       for (const JobEvent& event : news) followed.push_back((last = event).id);
     }
-    const auto kept = service_->events_after(id, "").value();
+    const auto kept = service_->events_after(kAnyone, id, "").value();
     for (const JobEvent& event : kept) all.push_back(event.id);
     EXPECT_EQ(followed, all);
   }
@@ -410,16 +411,16 @@ TEST_F(JobServiceTest, ACommitOfUnknownOutcomeIsToldOnceAndEndsAllWriting) {
   const auto volume = upload(*service_, "x").value();
   {
     const NoFileGrows full;
-    EXPECT_THROW(service_->submit(order_for(volume.id)), DatabaseError);
+    EXPECT_THROW(service_->submit(kAnyone, order_for(volume.id)), DatabaseError);
   }
   EXPECT_EQ(times_told, 1);
-  EXPECT_THROW(service_->submit(order_for(volume.id)), DatabaseError);
+  EXPECT_THROW(service_->submit(kAnyone, order_for(volume.id)), DatabaseError);
   EXPECT_EQ(times_told, 1);
   EXPECT_TRUE(service_->not_ready_because());
   service_.reset();
   open();
-  EXPECT_TRUE(service_->volume(volume.id));
-  EXPECT_TRUE(service_->submit(order_for(volume.id)));
+  EXPECT_TRUE(service_->volume(kAnyone, volume.id));
+  EXPECT_TRUE(service_->submit(kAnyone, order_for(volume.id)));
 }
 
 TEST_F(JobServiceTest, AStopEndsTheVerificationOfUploads) {
@@ -431,7 +432,7 @@ TEST_F(JobServiceTest, AStopEndsTheVerificationOfUploads) {
   uploading.join();
   EXPECT_EQ(answer, "not-ready");
   EXPECT_EQ(slug_of(upload(*service_, "too late")), "not-ready");
-  EXPECT_TRUE(service_->volumes().empty());
+  EXPECT_TRUE(service_->volumes(kAnyone).empty());
   for (const char* folder : {"tmp", "volumes"})
     EXPECT_TRUE(std::filesystem::is_empty(settings().data_dir / folder)) << folder;
 }

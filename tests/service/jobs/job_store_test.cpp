@@ -121,12 +121,12 @@ TEST_F(JobStoreTest, TheQueueHasAnEnd) {
 TEST_F(JobStoreTest, AVolumeStaysWhileAJobNeedsIt) {
   VolumeStore volumes(database_);
   add("j-1");
-  EXPECT_EQ(volumes.remove("v-1"), VolumeStore::Removal::kInUse);
+  EXPECT_EQ(volumes.remove("", "v-1"), VolumeStore::Removal::kInUse);
   jobs_.claim(kAnyMemory);
-  EXPECT_EQ(volumes.remove("v-1"), VolumeStore::Removal::kInUse);
+  EXPECT_EQ(volumes.remove("", "v-1"), VolumeStore::Removal::kInUse);
   jobs_.change(step("j-1", 1, kRunning, kFailed));
-  EXPECT_EQ(volumes.remove("v-1"), VolumeStore::Removal::kDone);
-  EXPECT_EQ(volumes.remove("v-1"), VolumeStore::Removal::kUnknown);
+  EXPECT_EQ(volumes.remove("", "v-1"), VolumeStore::Removal::kDone);
+  EXPECT_EQ(volumes.remove("", "v-1"), VolumeStore::Removal::kUnknown);
   EXPECT_EQ(state_of("j-1"), kFailed);
 }
 
@@ -266,8 +266,9 @@ TEST(StoreDatabase, TakesOverWhatAnEarlierVersionWrote) {
   const ScratchFolder scratch;
   const auto file = scratch / "test.db";
   {
-    StoreDatabase(file).write(
-        [](Database& database) { return database.run("INSERT INTO tombstones VALUES ('j-1', 0)"); });
+    StoreDatabase(file).write([](Database& database) {
+      return database.run("INSERT INTO tombstones (id, deleted_ms) VALUES ('j-1', 0)");
+    });
   }
   {
     Database as_it_was(file, Database::Access::kWriter);
@@ -277,15 +278,17 @@ TEST(StoreDatabase, TakesOverWhatAnEarlierVersionWrote) {
         "TABLE arrivals; "
         "ALTER TABLE jobs DROP COLUMN not_before_ms; ALTER TABLE jobs DROP COLUMN source_tries; "
         "ALTER TABLE jobs DROP COLUMN is_long; "
+        "DROP INDEX volumes_by_tenant; DROP INDEX jobs_by_tenant; ALTER TABLE volumes DROP COLUMN tenant; "
+        "ALTER TABLE jobs DROP COLUMN tenant; ALTER TABLE tombstones DROP COLUMN tenant; "
         "PRAGMA user_version = 1;");
   }
   StoreDatabase now(file);
   EXPECT_EQ(now.start_number(), 2);
-  EXPECT_TRUE(now.read([](Database& database) { return is_buried(database, "j-1"); }));
+  EXPECT_TRUE(now.read([](Database& database) { return is_buried(database, "j-1", kDefaultTenant); }));
   EXPECT_TRUE(now.read([](Database& database) {
     return database.query("SELECT 1 FROM sqlite_schema WHERE name = 'jobs_by_state'").step();
   }));
-  Database(file, Database::Access::kWriter).execute("PRAGMA user_version = 9");
+  Database(file, Database::Access::kWriter).execute("PRAGMA user_version = 99");
   EXPECT_THROW(StoreDatabase{file}, std::runtime_error);
 }
 

@@ -100,7 +100,7 @@ class PacsJobs : public JobServiceTest {
   /// The job once its delivery is in `state`.
   Job delivered(const std::string& id, DeliveryState state) {
     for (int tries = 0; tries < 6000; ++tries) {
-      Job job = service_->job(id).value();
+      Job job = service_->job(kAnyone, id).value();
       if (job.delivery && job.delivery->state == state) return job;
       std::this_thread::sleep_for(10ms);
     }
@@ -115,13 +115,13 @@ class PacsJobs : public JobServiceTest {
 
 TEST_F(PacsJobs, ASeriesIsFetchedAndThenComputedOn) {
   open();
-  const Job queued = service_->submit(source_order()).value();
+  const Job queued = service_->submit(kAnyone, source_order()).value();
   EXPECT_EQ(queued.order.volume, "");
   const Job done = wait_for(*service_, queued.id);
   EXPECT_EQ(done.state, JobState::kSucceeded);
-  ASSERT_EQ(service_->volumes().size(), 1U);
-  EXPECT_EQ(service_->volumes()[0].options.series, "1.2.3.4");
-  EXPECT_EQ(done.order.volume, service_->volumes()[0].id);
+  ASSERT_EQ(service_->volumes(kAnyone).size(), 1U);
+  EXPECT_EQ(service_->volumes(kAnyone)[0].options.series, "1.2.3.4");
+  EXPECT_EQ(done.order.volume, service_->volumes(kAnyone)[0].id);
   EXPECT_EQ(seen_volume_, done.order.volume);
   EXPECT_EQ(done.order.source->study, "1.2.3");
   EXPECT_EQ(node_.asked, 1);
@@ -130,37 +130,37 @@ TEST_F(PacsJobs, ASeriesIsFetchedAndThenComputedOn) {
 TEST_F(PacsJobs, AJobWaitsForASourceThatIsDown) {
   node_.up = false;
   open();
-  const std::string id = service_->submit(source_order()).value().id;
+  const std::string id = service_->submit(kAnyone, source_order()).value().id;
   Job waiting;
-  while (waiting.source_tries < 2) waiting = service_->job(id).value();
+  while (waiting.source_tries < 2) waiting = service_->job(kAnyone, id).value();
   EXPECT_EQ(waiting.progress.stage == "retrieve" || waiting.error->slug == "node-unreachable", true);
   node_.up = true;
   EXPECT_EQ(wait_for(*service_, id).state, JobState::kSucceeded);
-  EXPECT_FALSE(service_->job(id)->error);
+  EXPECT_FALSE(service_->job(kAnyone, id)->error);
 }
 
 TEST_F(PacsJobs, AWaitingJobSaysWhyAndUntilWhen) {
   node_.up = false;
   open();
-  const std::string id = service_->submit(source_order()).value().id;
+  const std::string id = service_->submit(kAnyone, source_order()).value().id;
   for (;;) {
-    const Job job = service_->job(id).value();
+    const Job job = service_->job(kAnyone, id).value();
     if (job.progress.stage != "waiting-for-source") continue;
     EXPECT_EQ(job.state, JobState::kQueued);
     EXPECT_EQ(job.error->slug, "node-unreachable");
     EXPECT_TRUE(job.next_attempt_at);
     break;
   }
-  ASSERT_TRUE(service_->cancel(id));  // it may just be asking again
+  ASSERT_TRUE(service_->cancel(kAnyone, id));  // it may just be asking again
   EXPECT_EQ(wait_for(*service_, id).state, JobState::kCancelled);
-  EXPECT_TRUE(service_->volumes().empty());
+  EXPECT_TRUE(service_->volumes(kAnyone).empty());
 }
 
 TEST_F(PacsJobs, WaitingSurvivesARestart) {
   node_.up = false;
   open();
-  const std::string id = service_->submit(source_order()).value().id;
-  while (service_->job(id)->source_tries < 1) std::this_thread::sleep_for(1ms);
+  const std::string id = service_->submit(kAnyone, source_order()).value().id;
+  while (service_->job(kAnyone, id)->source_tries < 1) std::this_thread::sleep_for(1ms);
   service_.reset();
   node_.up = true;
   open();
@@ -171,7 +171,7 @@ TEST_F(PacsJobs, PatienceEnds) {
   node_.up = false;
   patience_ = 50ms;
   open();
-  const Job failed = wait_for(*service_, service_->submit(source_order()).value().id);
+  const Job failed = wait_for(*service_, service_->submit(kAnyone, source_order()).value().id);
   EXPECT_EQ(failed.state, JobState::kFailed);
   EXPECT_EQ(failed.error->slug, "node-unreachable");
 }
@@ -180,8 +180,8 @@ TEST_F(PacsJobs, PatienceEnds) {
 TEST_F(PacsJobs, WhatNamesANodeThatTheConfigurationLostFails) {
   node_.up = false;
   open();
-  const std::string waiting = service_->submit(source_order()).value().id;
-  const std::string undelivered = service_->submit(delivery_order()).value().id;
+  const std::string waiting = service_->submit(kAnyone, source_order()).value().id;
+  const std::string undelivered = service_->submit(kAnyone, delivery_order()).value().id;
   wait_for(*service_, undelivered);
   service_.reset();
 
@@ -198,7 +198,7 @@ TEST_F(PacsJobs, WhatNamesANodeThatTheConfigurationLostFails) {
 TEST_F(PacsJobs, AMissingSeriesIsNotAskedForAgain) {
   node_.has_series = false;
   open();
-  const Job failed = wait_for(*service_, service_->submit(source_order()).value().id);
+  const Job failed = wait_for(*service_, service_->submit(kAnyone, source_order()).value().id);
   EXPECT_EQ(failed.error->slug, "source-not-found");
   EXPECT_EQ(node_.asked, 1);
 }
@@ -209,7 +209,7 @@ TEST_F(PacsJobs, BadOrdersAreRefused) {
   const auto refused = [&](const auto& change, const std::string& text) {
     JobOrder order = order_for(volume);
     change(order);
-    const auto answer = service_->submit(order);
+    const auto answer = service_->submit(kAnyone, order);
     ASSERT_FALSE(answer) << text;
     EXPECT_EQ(answer.error().slug, "bad-parameter");
     EXPECT_THAT(answer.error().detail, HasSubstr(text));
@@ -232,7 +232,7 @@ TEST_F(PacsJobs, BadOrdersAreRefused) {
 
 TEST_F(PacsJobs, ResultsGoToTheDestinationOnce) {
   open();
-  const std::string id = service_->submit(delivery_order()).value().id;
+  const std::string id = service_->submit(kAnyone, delivery_order()).value().id;
   const Job job = delivered(id, DeliveryState::kDelivered);
   EXPECT_EQ(job.state, JobState::kSucceeded);
   EXPECT_EQ(job.delivery->instances, 2);
@@ -244,9 +244,9 @@ TEST_F(PacsJobs, ResultsGoToTheDestinationOnce) {
 TEST_F(PacsJobs, OnlyWhatIsMissingIsSentAgain) {
   node_.go_down_after_each = true;
   open();
-  const std::string id = service_->submit(delivery_order()).value().id;
+  const std::string id = service_->submit(kAnyone, delivery_order()).value().id;
   while (true) {
-    const Job job = service_->job(id).value();
+    const Job job = service_->job(kAnyone, id).value();
     if (job.delivery && job.delivery->state == DeliveryState::kDelivered) break;
     EXPECT_TRUE(!job.delivery || job.delivery->tries == 0 || job.delivery->error->slug == "node-unreachable");
     std::this_thread::sleep_for(5ms);
@@ -258,8 +258,8 @@ TEST_F(PacsJobs, OnlyWhatIsMissingIsSentAgain) {
 TEST_F(PacsJobs, DeliveryGoesOnAfterARestart) {
   node_.up = false;
   open();
-  const std::string id = service_->submit(delivery_order()).value().id;
-  while (!service_->job(id)->delivery || service_->job(id)->delivery->tries == 0)
+  const std::string id = service_->submit(kAnyone, delivery_order()).value().id;
+  while (!service_->job(kAnyone, id)->delivery || service_->job(kAnyone, id)->delivery->tries == 0)
     std::this_thread::sleep_for(1ms);
   service_.reset();
   node_.up = true;
@@ -270,7 +270,7 @@ TEST_F(PacsJobs, DeliveryGoesOnAfterARestart) {
 TEST_F(PacsJobs, AStopDoesNotWaitForASilentNode) {
   node_.silent = true;
   open();
-  const std::string id = service_->submit(delivery_order()).value().id;
+  const std::string id = service_->submit(kAnyone, delivery_order()).value().id;
   while (node_.asked == 0) std::this_thread::sleep_for(1ms);
   const auto begin = std::chrono::steady_clock::now();
   service_.reset();
@@ -283,13 +283,13 @@ TEST_F(PacsJobs, AStopDoesNotWaitForASilentNode) {
 TEST_F(PacsJobs, ARefusedInstanceFailsTheDeliveryNotTheJob) {
   node_.refuses = "out.zip.2";
   open();
-  const std::string id = service_->submit(delivery_order()).value().id;
+  const std::string id = service_->submit(kAnyone, delivery_order()).value().id;
   const Job job = delivered(id, DeliveryState::kFailed);
   EXPECT_EQ(job.state, JobState::kSucceeded);
   EXPECT_EQ(job.delivery->error->slug, "delivery-refused");
   EXPECT_EQ(job.delivery->stored, 1);
   EXPECT_EQ(job.delivery->refused, 1);
-  const auto ledger = service_->ledger(id).value();
+  const auto ledger = service_->ledger(kAnyone, id).value();
   ASSERT_EQ(ledger.size(), 2U);
   EXPECT_EQ(ledger[0].state, "stored");
   EXPECT_EQ(ledger[1].state, "refused");
@@ -297,7 +297,7 @@ TEST_F(PacsJobs, ARefusedInstanceFailsTheDeliveryNotTheJob) {
   EXPECT_EQ(ledger[1].instance.result, "out.zip");
 
   node_.refuses = "";
-  service_->deliver_again(id).value();
+  service_->deliver_again(kAnyone, id).value();
   EXPECT_EQ(delivered(id, DeliveryState::kDelivered).delivery->stored, 2);
   EXPECT_THAT(node_.received, ElementsAre("out.zip.1", "out.zip.2", "out.zip.2"));
 }
@@ -305,21 +305,21 @@ TEST_F(PacsJobs, ARefusedInstanceFailsTheDeliveryNotTheJob) {
 TEST_F(PacsJobs, AJobWithoutDestinationHasAnEmptyLedger) {
   open();
   const auto volume = upload(*service_, "series").value();
-  const Job done = wait_for(*service_, service_->submit(order_for(volume.id)).value().id);
+  const Job done = wait_for(*service_, service_->submit(kAnyone, order_for(volume.id)).value().id);
   EXPECT_FALSE(done.delivery);
-  EXPECT_TRUE(service_->ledger(done.id)->empty());
-  EXPECT_FALSE(service_->deliver_again(done.id)->delivery);
-  EXPECT_EQ(slug_of(service_->ledger("j-aaaaaaaaaaaaaaaa")), "not-found");
-  EXPECT_EQ(slug_of(service_->deliver_again("j-aaaaaaaaaaaaaaaa")), "not-found");
+  EXPECT_TRUE(service_->ledger(kAnyone, done.id)->empty());
+  EXPECT_FALSE(service_->deliver_again(kAnyone, done.id)->delivery);
+  EXPECT_EQ(slug_of(service_->ledger(kAnyone, "j-aaaaaaaaaaaaaaaa")), "not-found");
+  EXPECT_EQ(slug_of(service_->deliver_again(kAnyone, "j-aaaaaaaaaaaaaaaa")), "not-found");
 }
 
 TEST_F(PacsJobs, ADeletedJobIsNotDelivered) {
   node_.up = false;
   open();
-  const std::string id = service_->submit(delivery_order()).value().id;
-  while (!service_->job(id)->delivery || service_->job(id)->delivery->tries == 0)
+  const std::string id = service_->submit(kAnyone, delivery_order()).value().id;
+  while (!service_->job(kAnyone, id)->delivery || service_->job(kAnyone, id)->delivery->tries == 0)
     std::this_thread::sleep_for(1ms);
-  ASSERT_TRUE(service_->delete_job(id));
+  ASSERT_TRUE(service_->delete_job(kAnyone, id));
   node_.up = true;
   std::this_thread::sleep_for(100ms);
   EXPECT_TRUE(node_.received.empty());
@@ -363,12 +363,12 @@ class PresetJobs : public JobServiceTest {
   auto send(const std::string& text, const std::string& preset = "head") {
     auto file = service_->begin_upload({}).value();
     file.write(std::as_bytes(std::span(text)));
-    return service_->receive(preset, std::move(file));
+    return service_->receive(kAnyone, preset, std::move(file));
   }
 
   std::vector<Job> jobs_once_there_are(std::size_t count) {
     for (int tries = 0; tries < 6000; ++tries) {
-      auto page = service_->jobs({}).value();
+      auto page = service_->jobs(kAnyone, {}).value();
       if (page.jobs.size() == count) return page.jobs;
       std::this_thread::sleep_for(10ms);
     }
@@ -391,7 +391,7 @@ TEST_F(PresetJobs, WhatArrivesInPiecesBecomesOneJobASeries) {
     EXPECT_EQ(done.state, JobState::kSucceeded);
     EXPECT_EQ(done.order.label, "sent");
     EXPECT_EQ(done.order.source->preset, "head");
-    std::ifstream in(service_->volume_content(done.order.volume)->path);
+    std::ifstream in(service_->volume_content(kAnyone, done.order.volume)->path);
     const std::string body((std::istreambuf_iterator<char>(in)), {});
     const std::string digit = done.order.source->series.substr(6);
     std::size_t parts = 0;
@@ -406,7 +406,7 @@ TEST_F(PresetJobs, WhatIsSentAgainIsTakenOnce) {
   open(300ms);
   for (int time = 0; time < 3; ++time) ASSERT_TRUE(send("1"));
   const Job done = wait_for(*service_, jobs_once_there_are(1)[0].id);
-  std::ifstream in(service_->volume_content(done.order.volume)->path);
+  std::ifstream in(service_->volume_content(kAnyone, done.order.volume)->path);
   const std::string body((std::istreambuf_iterator<char>(in)), {});
   EXPECT_EQ(body.find("Content-Type"), body.rfind("Content-Type"));
 }
@@ -432,7 +432,7 @@ TEST_F(PresetJobs, ASeriesIsNotQuietWhileItIsSentAgain) {
   ASSERT_TRUE(send("11"));
   const auto jobs = jobs_once_there_are(1);
   const Job done = wait_for(*service_, jobs[0].id);
-  std::ifstream in(service_->volume_content(done.order.volume)->path);
+  std::ifstream in(service_->volume_content(kAnyone, done.order.volume)->path);
   const std::string body((std::istreambuf_iterator<char>(in)), {});
   std::size_t parts = 0;
   for (std::size_t at = 0; (at = body.find("Content-Type", at)) != std::string::npos; ++at) ++parts;
@@ -450,7 +450,7 @@ TEST_F(PresetJobs, AJobThatFailsWithoutAVolumeKeepsItsArrivalsUntilItIsDeleted) 
   EXPECT_EQ(arrived_files(), 1);
   open();
   EXPECT_EQ(arrived_files(), 1);
-  ASSERT_TRUE(service_->delete_job(id));
+  ASSERT_TRUE(service_->delete_job(kAnyone, id));
   EXPECT_EQ(arrived_files(), 0);
 }
 
@@ -473,7 +473,7 @@ TEST_F(PresetJobs, ACancelledJobFreesItsArrivals) {
   open();
   ASSERT_TRUE(send("1"));
   const std::string id = jobs_once_there_are(1)[0].id;
-  ASSERT_TRUE(service_->cancel(id));
+  ASSERT_TRUE(service_->cancel(kAnyone, id));
   EXPECT_EQ(wait_for(*service_, id).state, JobState::kCancelled);
   service_->stop();
   EXPECT_EQ(arrived_files(), 0);
@@ -493,14 +493,14 @@ TEST_F(PresetJobs, RefusesWhatIsNoDicomAndUnknownPresets) {
   EXPECT_EQ(slug_of(send("bad")), "dicom-no-images");
   EXPECT_EQ(slug_of(send("1", "foot")), "not-found");
   EXPECT_EQ(arrived_files(), 0);
-  EXPECT_TRUE(service_->jobs({})->jobs.empty());
+  EXPECT_TRUE(service_->jobs(kAnyone, {})->jobs.empty());
 }
 
 TEST_F(PresetJobs, AnOrderOfAClientCannotNameAPreset) {
   open();
   JobOrder order;
   order.source = DicomSource{"", "1.2.3", "1.2.3.1", "head"};
-  EXPECT_EQ(slug_of(service_->submit(order)), "bad-parameter");
+  EXPECT_EQ(slug_of(service_->submit(kAnyone, order)), "bad-parameter");
 }
 
 TEST_F(PresetJobs, APresetThatCannotRunStopsTheStart) {

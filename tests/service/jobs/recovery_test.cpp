@@ -66,7 +66,8 @@ class RecoveryTest : public JobServiceTest {
     DaemonProcess daemon([&](int output) {
       JobService service(settings(), fake_.engine());
       std::string id = known_job;
-      if (id.empty()) id = service.submit(order_for(upload(service, "x").value().id, "gate")).value().id;
+      if (id.empty())
+        id = service.submit(kAnyone, order_for(upload(service, "x").value().id, "gate")).value().id;
       service.start();
       wait_for(service, id, JobState::kRunning);
       tell(output, id);
@@ -82,8 +83,9 @@ TEST_F(RecoveryTest, ARunningJobIsQueuedAgainAndDone) {
   const std::string id = die_while_running();
   fake_.open_gate();
   open();
-  EXPECT_EQ(service_->job(id)->state, JobState::kQueued);
-  EXPECT_EQ(slug_of(service_->delete_volume(service_->job(id)->order.volume)), "volume-in-use");
+  EXPECT_EQ(service_->job(kAnyone, id)->state, JobState::kQueued);
+  EXPECT_EQ(slug_of(service_->delete_volume(kAnyone, service_->job(kAnyone, id)->order.volume)),
+            "volume-in-use");
   service_->start();
   const Job job = wait_for(*service_, id);
   EXPECT_EQ(job.state, JobState::kSucceeded);
@@ -95,7 +97,7 @@ TEST_F(RecoveryTest, EventsOfAllStartsAreInOrder) {
   fake_.open_gate();
   open_and_start();
   wait_for(*service_, id);
-  const auto events = service_->events_after(id, "").value();
+  const auto events = service_->events_after(kAnyone, id, "").value();
   std::vector<std::string> states;
   for (std::size_t i = 0; i < events.size(); ++i) {
     EXPECT_LT(i == 0 ? "" : events[i - 1].id, events[i].id);
@@ -108,19 +110,20 @@ TEST_F(RecoveryTest, AJobThatKeepsKillingTheDaemonIsFailed) {
   const std::string id = die_while_running();
   for (int death = 2; death <= settings().max_deaths; ++death) die_while_running(id);
   open();
-  const Job job = service_->job(id).value();
+  const Job job = service_->job(kAnyone, id).value();
   ASSERT_EQ(job.state, JobState::kFailed);
   EXPECT_EQ(job.error->slug, "attempts-exhausted");
 }
 
 TEST_F(RecoveryTest, AStopIsNotCountedAgainstAJob) {
   open();
-  const std::string id = service_->submit(order_for(upload(*service_, "x").value().id, "gate")).value().id;
+  const std::string id =
+      service_->submit(kAnyone, order_for(upload(*service_, "x").value().id, "gate")).value().id;
   for (int stop = 0; stop < settings().max_deaths + 2; ++stop) {
     service_->start();
     wait_for(*service_, id, JobState::kRunning);
     service_->stop();
-    EXPECT_EQ(service_->job(id)->state, JobState::kQueued);
+    EXPECT_EQ(service_->job(kAnyone, id)->state, JobState::kQueued);
     service_.reset();
     open();
   }
@@ -139,15 +142,15 @@ TEST_F(RecoveryTest, ARequestedCancelSurvivesTheDeath) {
     };
     JobService service(settings(), engine);
     service.start();
-    const std::string id = service.submit(order_for(upload(service, "x").value().id)).value().id;
+    const std::string id = service.submit(kAnyone, order_for(upload(service, "x").value().id)).value().id;
     wait_for(service, id, JobState::kRunning);
-    if (service.cancel(id)) tell(output, id);
+    if (service.cancel(kAnyone, id)) tell(output, id);
     ::pause();
   });
   const std::string id = daemon.next_word();
   daemon.kill();
   open();
-  EXPECT_EQ(service_->job(id)->state, JobState::kCancelled);
+  EXPECT_EQ(service_->job(kAnyone, id)->state, JobState::kCancelled);
 }
 
 /// As long as it lives, no job can leave `running`: every such step fails in the database.
@@ -172,15 +175,15 @@ class LostEndTest : public JobServiceTest {
   std::string lose_a_job() {
     service_->start();
     const auto volume = upload(*service_, "x").value();
-    const std::string id = service_->submit(order_for(volume.id)).value().id;
+    const std::string id = service_->submit(kAnyone, order_for(volume.id)).value().id;
     while (fake_.computed == 0) std::this_thread::yield();
     // The events of an attempt are in memory while somebody runs it.
     while (events_of(id) > kEventsBeforeTheFirstReport) std::this_thread::yield();
-    EXPECT_EQ(service_->job(id)->state, JobState::kRunning);
+    EXPECT_EQ(service_->job(kAnyone, id)->state, JobState::kRunning);
     return id;
   }
 
-  std::size_t events_of(const std::string& id) { return service_->events_after(id, "")->size(); }
+  std::size_t events_of(const std::string& id) { return service_->events_after(kAnyone, id, "")->size(); }
 
   static constexpr std::size_t kEventsBeforeTheFirstReport = 2;  // queued, running
 };
@@ -195,7 +198,7 @@ TEST_F(LostEndTest, IsRunAgainOnceTheStoreWorks) {
   const Job job = wait_for(*service_, id);
   EXPECT_EQ(job.state, JobState::kSucceeded);
   EXPECT_EQ(job.attempt, 2);
-  EXPECT_TRUE(service_->result(id, "out.nii.gz"));
+  EXPECT_TRUE(service_->result(kAnyone, id, "out.nii.gz"));
 }
 
 TEST_F(LostEndTest, CanBeCancelled) {
@@ -204,16 +207,16 @@ TEST_F(LostEndTest, CanBeCancelled) {
   {
     const NoJobEnds broken(settings().data_dir);
     id = lose_a_job();
-    EXPECT_THROW(service_->cancel(id), DatabaseError);
+    EXPECT_THROW(service_->cancel(kAnyone, id), DatabaseError);
     service_->stop();
   }
-  EXPECT_EQ(service_->cancel(id)->state, JobState::kCancelled);
+  EXPECT_EQ(service_->cancel(kAnyone, id)->state, JobState::kCancelled);
 }
 
 TEST_F(RecoveryTest, SweepsWhatNoRowPointsTo) {
   open_and_start();
   const auto volume = upload(*service_, "x").value();
-  const Job job = wait_for(*service_, service_->submit(order_for(volume.id)).value().id);
+  const Job job = wait_for(*service_, service_->submit(kAnyone, order_for(volume.id)).value().id);
   service_.reset();
   const fs::path data = settings().data_dir;
   fs::create_directory(data / "results" / (job.id + ".2"));
@@ -222,8 +225,8 @@ TEST_F(RecoveryTest, SweepsWhatNoRowPointsTo) {
   open();
   EXPECT_EQ(std::distance(fs::directory_iterator(data / "results"), {}), 1);
   EXPECT_EQ(std::distance(fs::directory_iterator(data / "volumes"), {}), 1);
-  EXPECT_TRUE(service_->result(job.id, "out.nii.gz"));
-  EXPECT_TRUE(service_->volume_content(volume.id));
+  EXPECT_TRUE(service_->result(kAnyone, job.id, "out.nii.gz"));
+  EXPECT_TRUE(service_->volume_content(kAnyone, volume.id));
 }
 
 TEST_F(RecoveryTest, OneDaemonAtATimeHoldsTheData) {
@@ -256,7 +259,7 @@ TEST_F(RecoveryTest, AKillAtAnyMomentLosesNothingAndDoublesNothing) {
       for (int i = 0;; ++i) {
         const auto volume = upload(service, std::string(3000, static_cast<char>('a' + i % 26))).value();
         tell(output, volume.id + "=" + volume.sha256);
-        tell(output, service.submit(order_for(volume.id)).value().id);
+        tell(output, service.submit(kAnyone, order_for(volume.id)).value().id);
       }
     });
     const auto note = [&](const std::string& word) {
@@ -277,13 +280,13 @@ TEST_F(RecoveryTest, AKillAtAnyMomentLosesNothingAndDoublesNothing) {
   service_ = std::make_unique<JobService>(patient, fake_.engine());
   service_->start();
   for (const auto& [id, sha256] : digests)
-    EXPECT_EQ(digest_of(service_->volume_content(id)->path).sha256, sha256);
+    EXPECT_EQ(digest_of(service_->volume_content(kAnyone, id)->path).sha256, sha256);
   for (const std::string& id : jobs) {
     const Job job = wait_for(*service_, id);
     EXPECT_EQ(job.state, JobState::kSucceeded);
-    const auto file = service_->result(id, "out.nii.gz").value();
+    const auto file = service_->result(kAnyone, id, "out.nii.gz").value();
     EXPECT_EQ(digest_of(file.path).sha256, file.sha256);
-    EXPECT_EQ(file.sha256, service_->volume(job.order.volume)->sha256);
+    EXPECT_EQ(file.sha256, service_->volume(kAnyone, job.order.volume)->sha256);
   }
   const ServiceStatistics found = service_->statistics();
   EXPECT_GE(found.jobs_total, std::ssize(jobs));

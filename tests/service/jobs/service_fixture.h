@@ -14,6 +14,8 @@
 
 namespace volsmooth {
 
+inline const Caller kAnyone = Caller::anyone();
+
 inline MethodInfo blur_method() {
   MethodInfo method{"mean-curvature-flow", "A method to test with.", {}};
   method.parameters.push_back({"feature_radius_mm", "Radius.", "mm", 0.01, 200, {}, {}, "", "flow_time_mm2"});
@@ -122,7 +124,7 @@ inline tl::expected<StoredVolume, Problem> upload(JobService& service, const std
   auto file = service.begin_upload({});
   if (!file) return tl::unexpected(file.error());
   file->write(std::as_bytes(std::span(bytes)));
-  return service.keep_volume(*std::move(file), {});
+  return service.keep_volume(kAnyone, *std::move(file), {});
 }
 
 inline JobOrder order_for(const std::string& volume, const std::string& label = "") {
@@ -142,7 +144,7 @@ inline Job wait_for(JobService& service, const std::string& id, std::optional<Jo
   });
   std::unique_lock lock(mutex);
   for (int second = 0; second < 6000; ++second) {
-    Job job = service.job(id).value();
+    Job job = service.job(kAnyone, id).value();
     if (state ? job.state == *state : is_final(job.state)) return job;
     changed.wait_for(lock, std::chrono::milliseconds(10));
   }

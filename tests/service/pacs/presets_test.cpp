@@ -37,6 +37,17 @@ TEST(Presets, ABadTitleIsRefused) {
                 testing::HasSubstr("preset 'bone': 'aet' must be an AE title"));
 }
 
+TEST(Presets, BelongToATenant) {
+  const auto presets = presets_from(json{{"bone", {{"tenant", "ward-a"}}}, {"skin", json::object()}});
+  EXPECT_EQ(presets[0].tenant, "ward-a");
+  EXPECT_EQ(presets[1].tenant, kDefaultTenant);
+  for (const json& tenant : {json(5), json(""), json("a b")})
+    EXPECT_THAT(refusal_of([&] {
+                  presets_from(json{{"bone", {{"tenant", tenant}}}});
+                }),
+                testing::HasSubstr("'tenant' must be"));
+}
+
 TEST(Presets, ATitleIsOneOnly) {
   EXPECT_EQ(presets_by_title(presets_from(json{{"bone", json::object()}})),
             (std::map<std::string, std::string>{{"BONE", "bone"}}));
