@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <filesystem>
 #include <iostream>
 #include <optional>
@@ -35,6 +36,7 @@ struct Options {
   std::string dimse_listen;
   std::string log_level = "info";
   bool ephemeral = false;
+  int scrub_days = 7;
   // Of the configuration file.
   std::vector<Node> nodes;
   std::vector<Preset> presets;
@@ -75,6 +77,11 @@ void declare(CLI::App& app, Options& options) {
   app.add_option("--max-upload", options.jobs.max_upload_bytes, "Largest upload, such as 16GB")
       ->envname("VOLSMOOTH_MAX_UPLOAD")
       ->transform(CLI::AsSizeValue(false))
+      ->capture_default_str();
+  app.add_option("--scrub-days", options.scrub_days,
+                 "Every stored file is read and checked once in so many days; 0: only when it is asked for")
+      ->envname("VOLSMOOTH_SCRUB_DAYS")
+      ->check(CLI::Range(0, 3650))
       ->capture_default_str();
   app.add_option("--ingest", options.ingest_program,
                  "volsmooth-ingest, which reads DICOM; default: beside this program")
@@ -198,6 +205,7 @@ int run(int argc, char** argv) {
   }
   options.server.max_upload_bytes = options.jobs.max_upload_bytes;
   // The memory is said once, for the single job as for all that run together.
+  options.jobs.scrub_period = std::chrono::days(options.scrub_days);
   options.jobs = completed(std::move(options.jobs));
   options.server.max_connections =
       std::min(options.server.max_connections, connections_for(raise_open_files()));

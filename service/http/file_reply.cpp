@@ -1,7 +1,5 @@
 #include "service/http/file_reply.h"
 
-#include <system_error>
-
 #include "service/http/accept.h"
 #include "service/http/entity_tag.h"
 #include "service/http/range.h"
@@ -27,12 +25,15 @@ std::vector<FilePiece> multipart_pieces(const std::vector<ByteRange>& ranges, co
   return pieces;
 }
 
-tl::expected<std::shared_ptr<const OpenFile>, Problem> open_stored(const std::filesystem::path& path) {
+/// Whether what is sent first is what was stored. What comes later is checked when it is its turn; by then,
+/// all that can be done is to end the connection.
+bool begins_whole(const FileBody& body) {
   try {
-    return std::make_shared<const OpenFile>(path);
-  } catch (const std::system_error& error) {
-    if (error.code() != std::errc::no_such_file_or_directory) throw;
-    return tl::unexpected(Problem{"gone", "It was deleted while it was asked for."});
+    for (const FilePiece& piece : body.pieces)
+      if (piece.length > 0) body.file->check(piece.offset);
+    return true;
+  } catch (const DamagedFile&) {
+    return false;
   }
 }
 
@@ -56,9 +57,7 @@ Reply reply_with_file(const Request& request, const StoredFile& file) {
     ranges = std::move(*asked);
   }
 
-  auto opened = open_stored(file.path);
-  if (!opened) return tl::unexpected(opened.error());
-  FileBody body{std::move(*opened), {{"", 0, file.bytes}}, file.media_type};
+  FileBody body{file.file, {{"", 0, file.bytes}}, file.media_type};
   if (!ranges.empty()) response.status = 206;
   if (ranges.size() == 1) {
     response.headers.push_back({"Content-Range", content_range(ranges[0], file.bytes)});
@@ -67,6 +66,8 @@ Reply reply_with_file(const Request& request, const StoredFile& file) {
     body.media_type = "multipart/byteranges; boundary=" + std::string(kBoundary);
     body.pieces = multipart_pieces(ranges, file);
   }
+  if (!begins_whole(body))
+    return tl::unexpected(Problem{"integrity-failure", "The stored file is damaged and is not given out."});
   response.body = std::move(body);
   return response;
 }

@@ -13,7 +13,6 @@
 #include <vector>
 
 #include "service/http/head_check.h"
-#include "service/http/open_file.h"
 #include "service/http/target.h"
 #include "service/jobs/caller.h"
 #include "service/jobs/job_service.h"
@@ -44,7 +43,7 @@ struct FilePiece {
 };
 
 struct FileBody {
-  std::shared_ptr<const OpenFile> file;
+  std::shared_ptr<const CheckedFile> file;
   std::vector<FilePiece> pieces;
   std::string media_type;
 };

@@ -46,6 +46,9 @@ struct Metrics::State {
   Gauge& volumes = gauges("volsmooth_volumes", "Volumes that are kept.").Add({});
   Gauge& stored = gauges("volsmooth_stored_bytes", "Bytes of volumes and results.").Add({});
   Gauge& free_disk = gauges("volsmooth_free_disk_bytes", "Free bytes where the data is.").Add({});
+  Gauge& damaged =
+      gauges("volsmooth_damaged_files", "Stored files that are not what was stored; the log names them.")
+          .Add({});
   Gauge& uploads = gauges("volsmooth_uploads_receiving", "Uploads that are being received.").Add({});
 };
 
@@ -78,6 +81,7 @@ std::string Metrics::text(const ServiceStatistics& now) {
   state_->volumes.Set(static_cast<double>(now.volumes));
   state_->stored.Set(static_cast<double>(now.stored_bytes));
   state_->free_disk.Set(static_cast<double>(now.free_disk_bytes));
+  state_->damaged.Set(static_cast<double>(now.damaged_files));
   return prometheus::TextSerializer().Serialize(state_->registry.Collect());
 }
 

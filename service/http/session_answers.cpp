@@ -1,4 +1,5 @@
 #include <chrono>
+#include <span>
 
 #include "service/http/entity_tag.h"
 #include "service/http/problem_types.h"
@@ -7,7 +8,7 @@
 namespace volsmooth {
 namespace {
 
-constexpr std::int64_t kFileBlockBytes = 256 * 1024;
+constexpr std::int64_t kFileBlockBytes = BlockSums::kBlockBytes;  // each is read, checked and sent whole
 constexpr int kRetrySeconds = 5;
 
 /// The fields that go with a problem beside its document.
@@ -85,10 +86,11 @@ Session::Awaitable<bool> Session::send_file(Exchange& exchange, const FileBody& 
   std::vector<char> block;
   for (const auto& piece : body.pieces) {
     if (!co_await write(exchange, piece.prefix)) co_return false;
-    for (std::int64_t done = 0; done < piece.length; done += kFileBlockBytes) {
-      block.resize(static_cast<std::size_t>(std::min(kFileBlockBytes, piece.length - done)));
+    const std::int64_t end = piece.offset + piece.length;
+    for (std::int64_t at = piece.offset; at < end; at += static_cast<std::int64_t>(block.size())) {
+      block.resize(static_cast<std::size_t>(std::min(kFileBlockBytes - at % kFileBlockBytes, end - at)));
       const auto read = co_await run_guarded(context_.bulk, exchange, [&]() -> tl::expected<void, Problem> {
-        body.file->read(piece.offset + done, block);
+        body.file->read(at, std::as_writable_bytes(std::span(block)));
         return {};
       });
       if (!read || !co_await write(exchange, {block.data(), block.size()})) co_return false;

@@ -12,7 +12,7 @@ std::vector<std::string> texts_of(Statement rows) {
 
 }  // namespace
 
-bool ArrivalStore::add(std::string_view tenant, std::string_view preset, std::string_view file,
+bool ArrivalStore::add(std::string_view tenant, std::string_view preset, const FileRecord& file,
                        const std::vector<ArrivedInstance>& instances) {
   return database_.write([&](Database& database) {
     for (const ArrivedInstance& instance : instances)
@@ -20,10 +20,12 @@ bool ArrivalStore::add(std::string_view tenant, std::string_view preset, std::st
           "INSERT INTO arrivals (preset, study, series, sop_instance_uid, file, offset, bytes, received_ms, "
           "tenant) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT DO UPDATE SET received_ms = "
           "excluded.received_ms",
-          preset, instance.study_uid, instance.series_uid, instance.sop_instance_uid, file, instance.offset,
-          instance.bytes, milliseconds_of(now_in_milliseconds()), tenant);
+          preset, instance.study_uid, instance.series_uid, instance.sop_instance_uid, file.name,
+          instance.offset, instance.bytes, milliseconds_of(now_in_milliseconds()), tenant);
     audit(database, preset, "instances received");
-    return database.query("SELECT 1 FROM arrivals WHERE file = ? LIMIT 1", file).step();
+    const bool taken = database.query("SELECT 1 FROM arrivals WHERE file = ? LIMIT 1", file.name).step();
+    if (taken) insert_file(database, file);
+    return taken;
   });
 }
 
@@ -74,6 +76,7 @@ std::vector<std::string> forget_arrivals(Database& database, std::string_view jo
                                            "other.file = mine.file AND other.job IS NOT mine.job)",
                                        job_id));
   database.run("DELETE FROM arrivals WHERE " + of_job, job_id);
+  for (const std::string& file : files) forget_file(database, file);
   return files;
 }
 

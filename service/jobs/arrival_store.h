@@ -7,6 +7,7 @@
 
 #include "service/jobs/job_service.h"
 #include "service/jobs/store_database.h"
+#include "service/jobs/stored_files.h"
 
 namespace volsmooth {
 
@@ -25,7 +26,7 @@ class ArrivalStore {
 
   /// One that waits already stays as it is, but its series is not quiet: devices send again what they had no
   /// answer for. False: all were such, and nothing is in the file that is not in others.
-  bool add(std::string_view tenant, std::string_view preset, std::string_view file,
+  bool add(std::string_view tenant, std::string_view preset, const FileRecord& file,
            const std::vector<ArrivedInstance>& instances);
 
   /// A series of that preset of which nothing has arrived since, and whose it is.

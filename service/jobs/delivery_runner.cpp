@@ -49,9 +49,15 @@ tl::expected<void, NodeFailure> DeliveryRunner::send(const DeliveryStore::Due& d
   const auto job = jobs_.find(due.job_id);
   if (!job) throw Cancelled();  // deleted meanwhile, and the delivery with it
   const auto place = files_.path_of(results_directory(*job));
+  const auto keep_going = [this] {
+    if (stopping_) throw Cancelled();
+  };
   std::vector<DicomInstance> all;
   for (const Result& result : job->results) {
     if (!holds_instances(result)) continue;
+    if (!stored_files_.check(results_directory(*job) + "/" + result.name, keep_going))
+      return tl::unexpected(NodeFailure{
+          {"integrity-failure", "A stored result is damaged and is not sent; run the job again."}, false});
     for (DicomInstance& instance : pacs_.instances_in(place / result.name)) {
       instance.result = result.name;
       all.push_back(std::move(instance));
@@ -59,9 +65,6 @@ tl::expected<void, NodeFailure> DeliveryRunner::send(const DeliveryStore::Due& d
   }
   deliveries_.expect(due.job_id, all);
 
-  const auto keep_going = [this] {
-    if (stopping_) throw Cancelled();
-  };
   const auto record = [&](std::span<const InstanceAnswer> answers) {
     deliveries_.record(due.job_id, answers);
     wake_(due.job_id);

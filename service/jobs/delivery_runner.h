@@ -8,6 +8,7 @@
 #include "service/jobs/delivery_store.h"
 #include "service/jobs/job_service.h"
 #include "service/jobs/job_store.h"
+#include "service/jobs/stored_files.h"
 #include "service/jobs/worker_pool.h"
 #include "service/storage/file_store.h"
 
@@ -17,9 +18,11 @@ namespace volsmooth {
 /// the node says of each instance goes into the ledger at once, so that only the rest is sent again.
 class DeliveryRunner {
  public:
-  DeliveryRunner(const Pacs& pacs, FileStore& files, StoreDatabase& database, JobStore& jobs,
-                 const JobServiceSettings& settings, std::function<void(const std::string& job_id)> wake)
+  DeliveryRunner(const Pacs& pacs, StoredFiles& stored_files, FileStore& files, StoreDatabase& database,
+                 JobStore& jobs, const JobServiceSettings& settings,
+                 std::function<void(const std::string& job_id)> wake)
       : pacs_(pacs),
+        stored_files_(stored_files),
         files_(files),
         jobs_(jobs),
         deliveries_(database),
@@ -35,6 +38,7 @@ class DeliveryRunner {
   void settle(const DeliveryStore::Due& due, const tl::expected<void, NodeFailure>& sent);
 
   const Pacs& pacs_;
+  StoredFiles& stored_files_;
   FileStore& files_;
   JobStore& jobs_;
   DeliveryStore deliveries_;

@@ -53,7 +53,8 @@ struct StoredVolume {
   UploadOptions options;
   VolumeFacts facts;
   std::int64_t bytes = 0;
-  std::string sha256;  ///< of the bytes as uploaded, hex
+  std::string sha256;           ///< of the bytes as uploaded, hex
+  std::string block_sums = {};  ///< when it is stored; the store keeps them to itself
   Time created_at;
 };
 
@@ -97,6 +98,7 @@ struct Result {
   std::string media_type;
   std::int64_t bytes = 0;
   std::string sha256;
+  std::string block_sums = {};  ///< when it is stored; the store keeps them to itself
 };
 
 enum class JobState { kQueued, kRunning, kSucceeded, kFailed, kCancelled };

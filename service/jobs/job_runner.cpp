@@ -30,6 +30,7 @@ void seal(const fs::path& directory, Result& result, const RunningJob& running) 
   sync_path(file);
   result.bytes = digest.bytes;
   result.sha256 = digest.sha256;
+  result.block_sums = digest.block_sums;
 }
 
 }  // namespace
@@ -89,9 +90,4 @@ void JobRunner::publish(ClaimedJob& claim, std::vector<Result> results) const {
   }
   if (!seen) files_.remove(place);
 }
-
-std::string volume_file(std::string_view volume_id) {
-  return "volumes/" + std::string(volume_id);
-}
-
 }  // namespace volsmooth

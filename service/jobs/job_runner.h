@@ -29,7 +29,4 @@ class JobRunner {
   const std::function<void(const std::string&)> wake_;
 };
 
-/// Where the bytes of a volume lie below the data directory.
-std::string volume_file(std::string_view volume_id);
-
 }  // namespace volsmooth

@@ -32,16 +32,14 @@ JobService::~JobService() {
 
 void JobService::start() {
   state_->started = true;
-  for (WorkerPool* pool : {&state_->pool, &state_->retrievals, &state_->delivering, &state_->receiving})
-    pool->start();
+  for (WorkerPool* pool : state_->pools()) pool->start();
 }
 
 void JobService::stop() {
   state_->stopping = true;
   state_->running.interrupt_all(RunningJob::Interruption::kStop);
   state_->delivery_runner.stop();
-  for (WorkerPool* pool : {&state_->pool, &state_->retrievals, &state_->delivering, &state_->receiving})
-    pool->stop();
+  for (WorkerPool* pool : state_->pools()) pool->stop();
 }
 
 const Engine& JobService::engine() const {
@@ -61,6 +59,7 @@ tl::expected<StoredVolume, Problem> JobService::keep_volume(const Caller& caller
   if (file.bytes() > state_->settings.max_upload_bytes) return too_large(state_->settings.max_upload_bytes);
   StoredVolume volume;
   volume.sha256 = file.finish();
+  volume.block_sums = file.block_sums();
   auto facts = state_->verify(file.path(), options);
   if (!facts) return tl::unexpected(std::move(facts.error()));
   volume.id = new_id("v-");
@@ -87,13 +86,14 @@ tl::expected<std::vector<ArrivedInstance>, Problem> JobService::receive(const Ca
   if (std::ranges::find(state_->pacs.presets, preset, &Preset::name) == state_->pacs.presets.end())
     return refuse("not-found", "The configuration has no such preset.");
   if (file.bytes() > state_->settings.max_upload_bytes) return too_large(state_->settings.max_upload_bytes);
-  file.finish();
+  const std::string sha256 = file.finish();
   auto instances = state_->engine.instances(file.path());
   if (!instances) return instances;
   const std::string place = new_arrival_file();
+  const FileRecord record{place, file.bytes(), sha256, file.block_sums()};
   state_->files.adopt(std::move(file), place);
   try {
-    if (!state_->arrivals.add(caller.tenant, preset, place, *instances)) state_->files.remove(place);
+    if (!state_->arrivals.add(caller.tenant, preset, record, *instances)) state_->files.remove(place);
   } catch (...) {
     if (!state_->database.condemned()) state_->files.remove(place);
     throw;

@@ -14,6 +14,7 @@
 #include "service/jobs/caller.h"
 #include "service/jobs/job.h"
 #include "service/jobs/pacs.h"
+#include "service/storage/checked_file.h"
 #include "service/storage/incoming_file.h"
 
 namespace volsmooth {
@@ -30,6 +31,9 @@ struct JobServiceSettings {
   int max_queued = 10'000;
   std::chrono::milliseconds node_patience = std::chrono::hours(24);  ///< a node that is down is asked again
   std::chrono::milliseconds longest_node_pause = std::chrono::minutes(5);
+  std::chrono::milliseconds scrub_period =
+      std::chrono::days(7);          ///< every stored file is read so often; 0: never
+  std::function<Time()> clock = {};  ///< none: the machine's
 };
 
 /// With what follows from the machine filled in (jobs/machine.h).
@@ -59,10 +63,12 @@ struct StoredFile {
   std::string media_type;
   std::int64_t bytes = 0;
   std::string sha256;
+  std::shared_ptr<const CheckedFile> file;  ///< gives its bytes, each block checked
 };
 
 struct ServiceStatistics {
   std::int64_t queued = 0, running = 0, volumes = 0, jobs_total = 0, stored_bytes = 0, free_disk_bytes = 0;
+  std::int64_t damaged_files = 0;
 };
 
 /// Where one instance of a delivery is.

@@ -5,6 +5,7 @@
 #include "service/jobs/arrival_store.h"
 #include "service/jobs/delivery_store.h"
 #include "service/jobs/job_json.h"
+#include "service/jobs/stored_files.h"
 #include "service/jobs/stored_json.h"
 #include "service/jobs/volume_store.h"
 
@@ -84,7 +85,12 @@ void insert_event(Database& database, std::string_view job_id, const NumberedEve
       job_id, event.number.start, event.number.number, event.kind, event.data);
 }
 
-void insert_results(Database& database, std::string_view job_id, const std::vector<Result>& results) {
+std::string results_directory(std::string_view job_id, std::int64_t attempt) {
+  return "results/" + std::string(job_id) + "." + std::to_string(attempt);
+}
+
+void insert_results(Database& database, std::string_view job_id, std::int64_t attempt,
+                    const std::vector<Result>& results) {
   for (std::size_t position = 0; position < results.size(); ++position) {
     const Result& result = results[position];
     database.run(
@@ -93,6 +99,8 @@ void insert_results(Database& database, std::string_view job_id, const std::vect
         "bytes, sha256) SELECT sequence, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11 FROM jobs WHERE id = ?1",
         job_id, position, result.name, result.kind, result.method, json(result.isovalues).dump(),
         result.many_surfaces, result.frame, result.media_type, result.bytes, result.sha256);
+    insert_file(database, {results_directory(job_id, attempt) + "/" + result.name, result.bytes,
+                           result.sha256, result.block_sums});
   }
 }
 
@@ -100,10 +108,6 @@ std::int64_t count(Database& database, std::string_view sql) {
   Statement row = database.query(sql);
   row.step();
   return row.integer(0);
-}
-
-std::string results_directory(std::string_view job_id, std::int64_t attempt) {
-  return "results/" + std::string(job_id) + "." + std::to_string(attempt);
 }
 
 /// The row of a job for a volume that is here, or for a series that is still at its source.
@@ -223,7 +227,7 @@ bool JobStore::change_in(Database& database, const JobChange& change) {
   for (const NumberedEvent& event : change.progress_events) insert_event(database, change.id, event);
   insert_event(database, change.id,
                {events_.next(), "state", state_event_data(change.id, change.to, finished, change.error)});
-  insert_results(database, change.id, change.results);
+  insert_results(database, change.id, change.attempt, change.results);
   if (change.retrieved) take_retrieved(database, change.id, *change.retrieved);
   if (change.to == JobState::kSucceeded)
     if (const auto job = find_in(database, change.id); !job->order.destination.empty())
@@ -259,6 +263,7 @@ std::optional<JobStore::Removal> JobStore::remove(std::string_view id,
       job = find_in(database, id);
     }
     auto arrived_files = forget_arrivals(database, id);
+    forget_files_in(database, results_directory(*job));
     database.run("DELETE FROM jobs WHERE id = ?", id);
     bury(database, id, job->tenant);
     audit(database, id, "job deleted");
@@ -308,6 +313,7 @@ ServiceStatistics JobStore::statistics() {
     found.stored_bytes = count(database,
                                "SELECT (SELECT coalesce(sum(bytes), 0) FROM volumes) + "
                                "(SELECT coalesce(sum(bytes), 0) FROM results)");
+    found.damaged_files = count(database, "SELECT count(*) FROM stored_files WHERE damaged = 1");
     return found;
   });
 }

@@ -32,6 +32,7 @@ tl::unexpected<Problem> refuse(std::string slug, std::string detail, nlohmann::j
 JobServiceSettings completed(JobServiceSettings settings) {
   if (settings.memory_limit_bytes == 0) settings.memory_limit_bytes = usable_memory_bytes() / 10 * 8;
   if (settings.threads == 0) settings.threads = usable_cores();
+  if (!settings.clock) settings.clock = now_in_milliseconds;
   return settings;
 }
 
@@ -41,6 +42,7 @@ JobService::State::State(JobServiceSettings given, Engine computing, Pacs networ
       pacs(std::move(network)),
       files(settings.data_dir, settings.reserved_disk_bytes),
       database(files.path_of("volsmooth.db")),
+      stored_files(database, files),
       volumes(database),
       jobs(database),
       deliveries(database),
@@ -48,12 +50,14 @@ JobService::State::State(JobServiceSettings given, Engine computing, Pacs networ
       runner(engine, files, database, settings.threads, [this](const std::string& id) { wakes.wake(id); }),
       source_runner(engine, pacs, files, database, settings,
                     [this](const std::string& id) { wakes.wake(id); }),
-      delivery_runner(pacs, files, database, jobs, settings,
+      delivery_runner(pacs, stored_files, files, database, jobs, settings,
                       [this](const std::string& id) { wakes.wake(id); }),
+      scrubber(stored_files, settings.scrub_period, settings.clock, stopping),
       pool(settings.workers, [this] { return claim(JobStore::Work::kCompute); }),
       retrievals(kExchanges, [this] { return claim(JobStore::Work::kRetrieve); }),
       delivering(kExchanges, [this] { return delivery_runner.claim(); }),
-      receiving(pacs.presets.empty() ? 0 : 1, [this] { return claim_arrivals(); }) {
+      receiving(pacs.presets.empty() ? 0 : 1, [this] { return claim_arrivals(); }),
+      scrubbing(1, [this] { return scrubber.claim(); }) {
   check_presets();
   recover();
   sweep();
@@ -275,15 +279,10 @@ tl::expected<void, Problem> JobService::State::check(const JobOrder& order) cons
 tl::expected<StoredFile, Problem> JobService::State::stored_file(const std::string& name,
                                                                  const std::string& media_type,
                                                                  std::int64_t bytes,
-                                                                 const std::string& sha256) const {
-  const std::filesystem::path path = files.path_of(name);
-  std::error_code failure;
-  const auto found = std::filesystem::file_size(path, failure);
-  if (failure || static_cast<std::int64_t>(found) != bytes) {
-    spdlog::critical("stored file {} is missing or has another size than recorded", name);
-    return refuse("integrity-failure", "The stored file is damaged and is not given out.");
-  }
-  return StoredFile{path, media_type, bytes, sha256};
+                                                                 const std::string& sha256) {
+  return stored_files.open(name).map([&](std::shared_ptr<const CheckedFile> file) {
+    return StoredFile{files.path_of(name), media_type, bytes, sha256, std::move(file)};
+  });
 }
 
 }  // namespace volsmooth

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <functional>
 #include <mutex>
@@ -12,6 +13,7 @@
 #include "service/jobs/job_service.h"
 #include "service/jobs/job_store.h"
 #include "service/jobs/running_jobs.h"
+#include "service/jobs/scrubber.h"
 #include "service/jobs/source_runner.h"
 #include "service/jobs/volume_store.h"
 #include "service/jobs/wake_list.h"
@@ -43,6 +45,8 @@ struct JobService::State {
   void start_job_of(const Preset& preset, const ArrivalStore::QuietSeries& series);
   void forget_arrivals(const Job& job);  ///< when it needs them no more
 
+  std::array<WorkerPool*, 5> pools() { return {&pool, &retrievals, &delivering, &receiving, &scrubbing}; }
+
   // Answers.
   /// What the engine says of an upload; not-ready when the service is stopped meanwhile.
   tl::expected<VolumeFacts, Problem> verify(const std::filesystem::path& file,
@@ -55,13 +59,14 @@ struct JobService::State {
   tl::expected<void, Problem> check(const JobOrder& order) const;
   tl::expected<void, Problem> check_nodes(const JobOrder& order) const;
   tl::expected<StoredFile, Problem> stored_file(const std::string& name, const std::string& media_type,
-                                                std::int64_t bytes, const std::string& sha256) const;
+                                                std::int64_t bytes, const std::string& sha256);
 
   const JobServiceSettings settings;
   const Engine engine;
   const Pacs pacs;
   FileStore files;
   StoreDatabase database;
+  StoredFiles stored_files;
   VolumeStore volumes;
   JobStore jobs;
   DeliveryStore deliveries;
@@ -74,7 +79,8 @@ struct JobService::State {
   std::function<void(const Job&)> observer;
   std::mutex claiming;
   std::atomic<bool> started = false, stopping = false;
-  WorkerPool pool, retrievals, delivering, receiving;  // last: their threads use all of the above
+  Scrubber scrubber;
+  WorkerPool pool, retrievals, delivering, receiving, scrubbing;  // last: their threads use all of the above
 };
 
 }  // namespace volsmooth

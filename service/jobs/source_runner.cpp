@@ -2,9 +2,7 @@
 
 #include <spdlog/spdlog.h>
 
-#include <fstream>
 #include <span>
-#include <stdexcept>
 #include <system_error>
 
 #include "service/jobs/arrival_store.h"
@@ -20,6 +18,8 @@ NodeFailure no_room() {
 }
 
 NodeFailure failure_of(const std::exception& thrown) {
+  if (dynamic_cast<const DamagedFile*>(&thrown))
+    return {{"integrity-failure", "What has arrived of the series is damaged; send it again."}, false};
   const auto* error = dynamic_cast<const std::system_error*>(&thrown);
   if (error && error->code() == std::errc::no_space_on_device) return no_room();
   return {{"internal", "The series could not be fetched; the fault is the service's, see its log."}, false};
@@ -62,6 +62,7 @@ tl::expected<StoredVolume, NodeFailure> SourceRunner::retrieve(ClaimedJob& claim
   volume.tenant = claim.job().tenant;
   volume.options.series = source.series;
   volume.sha256 = file.finish();
+  volume.block_sums = file.block_sums();
   volume.bytes = file.bytes();
   volume.created_at = now_in_milliseconds();
   auto facts = engine_.inspect(file.path(), volume.options, [&](double) { running.throw_if_interrupted(); });
@@ -82,11 +83,11 @@ void SourceRunner::assemble(ClaimedJob& claim, IncomingFile& file, const Progres
     report(static_cast<double>(part) / static_cast<double>(parts.size()));
     const auto& [name, offset, bytes] = parts[part];
     write("--" + boundary + "\r\nContent-Type: application/dicom\r\n\r\n");
-    std::string content(static_cast<std::size_t>(bytes), '\0');
-    std::ifstream in(files_.path_of(name), std::ios::binary);
-    in.seekg(offset);
-    if (!in.read(content.data(), bytes)) throw std::runtime_error("an arrived file cannot be read");
-    write(content);
+    const auto stored = StoredFiles(database_, files_).open(name);
+    if (!stored || offset + bytes > (*stored)->bytes()) throw DamagedFile();
+    std::vector<std::byte> content(static_cast<std::size_t>(bytes));
+    (*stored)->read(offset, content);
+    file.write(content);
     write("\r\n");
   }
   write("--" + boundary + "--\r\n");

@@ -137,8 +137,29 @@ constexpr const char* kTenants = R"(
     WHERE job IS NULL;
 )";
 
+/// What is to be in every stored file. Of those from before, only a look can tell all of it.
+constexpr const char* kStoredFiles = R"(
+  CREATE TABLE stored_files (
+    name       TEXT NOT NULL UNIQUE,
+    bytes      INTEGER NOT NULL,
+    sha256     TEXT NOT NULL,
+    block_sums TEXT NOT NULL,
+    checked_ms INTEGER NOT NULL,
+    damaged    INTEGER NOT NULL DEFAULT 0
+  ) STRICT;
+  CREATE INDEX stored_files_by_check ON stored_files (checked_ms);
+  CREATE INDEX damaged_files ON stored_files (checked_ms) WHERE damaged = 1;
+  INSERT INTO stored_files (name, bytes, sha256, block_sums, checked_ms)
+    SELECT 'volumes/' || id, bytes, sha256, '', 0 FROM volumes;
+  INSERT INTO stored_files (name, bytes, sha256, block_sums, checked_ms)
+    SELECT 'results/' || id || '.' || attempt || '/' || name, bytes, sha256, '', 0
+    FROM results JOIN jobs ON jobs.sequence = results.job;
+  INSERT INTO stored_files (name, bytes, sha256, block_sums, checked_ms)
+    SELECT DISTINCT file, -1, '', '', 0 FROM arrivals;
+)";
+
 /// What makes each version of the schema of the one before.
-constexpr std::array kVersions = {kFirstSchema, kIndexByState, kNodes, kLongJobs, kTenants};
+constexpr std::array kVersions = {kFirstSchema, kIndexByState, kNodes, kLongJobs, kTenants, kStoredFiles};
 constexpr std::size_t kNewestVersion = kVersions.size();
 
 std::size_t schema_version(Database& database) {

@@ -1,5 +1,6 @@
 #include "service/jobs/volume_store.h"
 
+#include "service/jobs/stored_files.h"
 #include "service/jobs/stored_json.h"
 
 namespace volsmooth {
@@ -22,8 +23,13 @@ StoredVolume volume_from(const Statement& row) {
 
 }  // namespace
 
+std::string volume_file(std::string_view volume_id) {
+  return "volumes/" + std::string(volume_id);
+}
+
 int insert_volume(Database& database, const StoredVolume& volume) {
   audit(database, volume.id, "volume stored");
+  insert_file(database, {volume_file(volume.id), volume.bytes, volume.sha256, volume.block_sums});
   return database.run(
       "INSERT INTO volumes (id, options, facts, bytes, sha256, created_ms, tenant) VALUES (?, ?, ?, ?, ?, ?, "
       "?)",
@@ -63,6 +69,7 @@ VolumeStore::Removal VolumeStore::remove(std::string_view tenant, std::string_vi
       return database.query("SELECT 1 FROM volumes WHERE id = ? AND tenant = ?", id, tenant).step()
                  ? Removal::kInUse
                  : Removal::kUnknown;
+    forget_file(database, volume_file(id));
     bury(database, id, tenant);
     audit(database, id, "volume deleted");
     return Removal::kDone;

@@ -9,6 +9,9 @@
 
 namespace volsmooth {
 
+/// Where the bytes of a volume lie below the data directory.
+std::string volume_file(std::string_view volume_id);
+
 /// Part of the caller's transaction.
 int insert_volume(Database& database, const StoredVolume& volume);
 

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "service/storage/block_sums.h"
 #include "service/storage/posix.h"
 
 namespace volsmooth {
@@ -54,13 +55,16 @@ FileDigest digest_of(const std::filesystem::path& file, const std::function<void
   const FileDescriptor input = open_file(file, O_RDONLY);
   std::vector<std::byte> block(kBlockBytes);
   Sha256 sha256;
+  BlockSums sums;
   FileDigest result;
   while (const std::size_t got = read_some(input, block)) {
     sha256.update(std::span(block).first(got));
+    sums.update(std::span(block).first(got));
     result.bytes += static_cast<std::int64_t>(got);
     between_blocks();
   }
   result.sha256 = sha256.hex();
+  result.block_sums = sums.text();
   return result;
 }
 

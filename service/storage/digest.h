@@ -27,6 +27,7 @@ class Sha256 {
 struct FileDigest {
   std::int64_t bytes = 0;
   std::string sha256;
+  std::string block_sums = {};  ///< the text of its BlockSums
 };
 
 /// Reads a whole file; calls `between_blocks` every few megabytes, which may throw to end it. Throws

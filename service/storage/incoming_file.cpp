@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <system_error>
 
+#include "service/storage/block_sums.h"
 #include "service/storage/digest.h"
 #include "service/storage/posix.h"
 
@@ -46,6 +47,7 @@ struct IncomingFile::State {
   std::shared_ptr<DiskSpace> disk;
   std::int64_t promised_bytes = 0;
   Sha256 running;
+  BlockSums sums;
   std::string sha256;  // empty: not finished
   std::int64_t bytes = 0;
   bool released = false;
@@ -68,6 +70,7 @@ void IncomingFile::write(std::span<const std::byte> bytes) {
   write_all(state_->file, bytes);
   state_->redeem(count);
   state_->running.update(bytes);
+  state_->sums.update(bytes);
   state_->bytes += count;
 }
 
@@ -76,6 +79,10 @@ std::int64_t IncomingFile::bytes() const {
 }
 const std::filesystem::path& IncomingFile::path() const {
   return state_->path;
+}
+
+std::string IncomingFile::block_sums() const {
+  return state_->sums.text();
 }
 
 std::string IncomingFile::finish() {

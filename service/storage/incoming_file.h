@@ -26,6 +26,7 @@ class IncomingFile {
   void write(std::span<const std::byte> bytes);  ///< throws std::system_error; ENOSPC before the disk is full
   std::int64_t bytes() const;
   const std::filesystem::path& path() const;
+  std::string block_sums() const;  ///< the text of the BlockSums of what was written
 
   /// Ends writing: flushes to the disk (fsync) and returns the SHA-256 of all bytes in hex. Throws
   /// std::system_error.

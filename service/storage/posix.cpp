@@ -38,6 +38,21 @@ std::size_t read_some(const FileDescriptor& file, std::span<std::byte> into) {
   }
 }
 
+std::size_t read_at(const FileDescriptor& file, std::int64_t offset, std::span<std::byte> into) {
+  std::size_t filled = 0;
+  while (filled < into.size()) {
+    const ssize_t got = ::pread(file.get(), into.data() + filled, into.size() - filled,
+                                offset + static_cast<std::int64_t>(filled));
+    if (got == 0) break;
+    if (got > 0) {
+      filled += static_cast<std::size_t>(got);
+    } else if (errno != EINTR) {
+      throw_errno("read");
+    }
+  }
+  return filled;
+}
+
 void write_all(const FileDescriptor& file, std::span<const std::byte> bytes) {
   while (!bytes.empty()) {
     const ssize_t put = ::write(file.get(), bytes.data(), bytes.size());

@@ -83,6 +83,13 @@ class HttpClient {
     return take(received_.find(mark) + mark.size());
   }
 
+  /// All that comes until the server closes the connection.
+  std::string receive_to_end() {
+    while (fill()) {
+    }
+    return std::move(received_);
+  }
+
   /// Whether the server closes the connection, with nothing more to say.
   bool is_closed() { return received_.empty() && !fill(); }
 

@@ -267,7 +267,15 @@ TEST(StoreDatabase, TakesOverWhatAnEarlierVersionWrote) {
   const auto file = scratch / "test.db";
   {
     StoreDatabase(file).write([](Database& database) {
-      return database.run("INSERT INTO tombstones (id, deleted_ms) VALUES ('j-1', 0)");
+      database.execute(
+          "INSERT INTO tombstones (id, deleted_ms) VALUES ('j-1', 0); "
+          "INSERT INTO volumes (id, options, facts, bytes, sha256, created_ms) VALUES ('v-1', '{}', '{}', 5, "
+          "'aa', 0); "
+          "INSERT INTO jobs (id, volume, method, label, state, job_order, parameters, memory_bytes, "
+          "created_ms, stage, "
+          "attempt) VALUES ('j-2', 'v-1', '', '', 'succeeded', '{}', '{}', 1, 0, '', 3); "
+          "INSERT INTO results VALUES (1, 0, 'report.json', 'report', '', '[]', 0, '', '', 7, 'bb')");
+      return true;
     });
   }
   {
@@ -277,7 +285,7 @@ TEST(StoreDatabase, TakesOverWhatAnEarlierVersionWrote) {
         "WHERE state IN ('queued', 'running'); DROP TABLE delivered_instances; DROP TABLE deliveries; DROP "
         "TABLE arrivals; "
         "ALTER TABLE jobs DROP COLUMN not_before_ms; ALTER TABLE jobs DROP COLUMN source_tries; "
-        "ALTER TABLE jobs DROP COLUMN is_long; "
+        "ALTER TABLE jobs DROP COLUMN is_long; DROP TABLE stored_files; "
         "DROP INDEX volumes_by_tenant; DROP INDEX jobs_by_tenant; ALTER TABLE volumes DROP COLUMN tenant; "
         "ALTER TABLE jobs DROP COLUMN tenant; ALTER TABLE tombstones DROP COLUMN tenant; "
         "PRAGMA user_version = 1;");
@@ -285,6 +293,11 @@ TEST(StoreDatabase, TakesOverWhatAnEarlierVersionWrote) {
   StoreDatabase now(file);
   EXPECT_EQ(now.start_number(), 2);
   EXPECT_TRUE(now.read([](Database& database) { return is_buried(database, "j-1", kDefaultTenant); }));
+  EXPECT_EQ(now.read([](Database& database) {
+    return all_of(database.query("SELECT name, bytes, sha256 FROM stored_files ORDER BY bytes"),
+                  [](const Statement& row) { return row.text(0) + " " + row.text(1) + " " + row.text(2); });
+  }),
+            (std::vector<std::string>{"volumes/v-1 5 aa", "results/j-2.3/report.json 7 bb"}));
   EXPECT_TRUE(now.read([](Database& database) {
     return database.query("SELECT 1 FROM sqlite_schema WHERE name = 'jobs_by_state'").step();
   }));
