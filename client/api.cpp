@@ -97,7 +97,8 @@ Expected<nlohmann::json> Api::upload_body(const Descriptor& descriptor, std::int
   return document({.method = "POST",
                    .target = target_of("/v1/volumes", options),
                    .content_type = content_type,
-                   .file = &body});
+                   .file = &body,
+                   .idempotency_key = new_idempotency_key()});
 }
 
 Expected<nlohmann::json> Api::volumes() {
@@ -117,6 +118,7 @@ Expected<nlohmann::json> Api::submit(const Json& order) {
                    .target = "/v1/jobs",
                    .content_type = "application/json",
                    .body = order.dump(),
+                   .idempotency_key = new_idempotency_key(),
                    .interruptible = false,
                    .timeout = kShortCall});
 }

@@ -7,6 +7,8 @@
 #include <cerrno>
 #include <cstring>
 #include <optional>
+#include <random>
+#include <thread>
 
 namespace volsmooth {
 namespace {
@@ -15,6 +17,7 @@ constexpr long kConnectSeconds = 10;
 constexpr long kStalled =
     300;  ///< seconds without a byte; verifying a large upload takes a good part of a minute
 constexpr long kBufferBytes = 1L << 18;
+constexpr std::chrono::milliseconds kPause{500};  ///< before the second try; before the third, twice that
 constexpr std::size_t kMaxDocument = std::size_t{64} << 20;  ///< bytes; documents are kept in memory
 
 /// What the callbacks of one transfer share.
@@ -75,6 +78,12 @@ Failure broken(CURLcode code, const ServerAddress& server) {
   }
 }
 
+/// The connection was there and broke.
+bool is_answer_lost(CURLcode code) {
+  return code == CURLE_GOT_NOTHING || code == CURLE_RECV_ERROR || code == CURLE_SEND_ERROR ||
+         code == CURLE_PARTIAL_FILE;
+}
+
 const Failure kInterruptedFailure{ExitCode::kInterrupted, "Interrupted.", {}};
 
 struct HeaderList {
@@ -84,6 +93,13 @@ struct HeaderList {
 };
 
 }  // namespace
+
+std::string new_idempotency_key() {
+  std::random_device random;  // the kernel's
+  std::string key;
+  for (int word = 0; word < 4; ++word) key += std::to_string(random()) + (word < 3 ? "-" : "");
+  return key;
+}
 
 struct HttpClient::Handles {
   CURL* easy = curl_easy_init();
@@ -165,24 +181,48 @@ HttpClient::HttpClient(ServerAddress server, std::string token, const Interrupti
 HttpClient::~HttpClient() = default;
 
 Expected<Response> HttpClient::send(const Request& request) {
+  const off_t start = request.file != nullptr ? lseek(request.file->descriptor, 0, SEEK_CUR) : 0;
+  Outcome outcome = send_once(request);
+  for (int tries = 1; tries < kTries && is_worth_another(request, outcome, tries > 1); ++tries) {
+    if (request.interruptible && interruption_.waited(tries * kPause)) break;
+    if (!request.interruptible) std::this_thread::sleep_for(tries * kPause);
+    if (request.file != nullptr && lseek(request.file->descriptor, start, SEEK_SET) < 0) break;
+    outcome = send_once(request);
+  }
+  return std::move(outcome.response);
+}
+
+/// A server that is not there at first is not there; one that went away may be back in a moment, and needs
+/// one to see that the connection is broken.
+bool HttpClient::is_worth_another(const Request& request, const Outcome& outcome, bool is_repetition) const {
+  if (request.idempotency_key.empty()) return false;
+  if (outcome.is_lost) return true;
+  if (!is_repetition) return false;
+  if (!outcome.response) return outcome.response.error().code == ExitCode::kUnreachable;
+  return outcome.response->status == 409 &&
+         outcome.response->body.find("/problems/idempotency-in-flight") != std::string::npos;
+}
+
+HttpClient::Outcome HttpClient::send_once(const Request& request) {
   Transfer transfer{request, handles_->easy, {}, {}};
   HeaderList headers;
   headers.add("Accept: application/json, application/problem+json, */*");
   headers.add("Content-Type:" + (request.content_type.empty() ? "" : " " + request.content_type));
+  if (!request.idempotency_key.empty()) headers.add("Idempotency-Key: " + request.idempotency_key);
   if (!token_.empty()) headers.add("Authorization: Bearer " + token_);
   handles_->set_up(server_, transfer, headers);
 
   const auto end = handles_->perform(request.interruptible ? &interruption_ : nullptr);
   curl_easy_getinfo(handles_->easy, CURLINFO_RESPONSE_CODE, &transfer.response.status);
   if (log_) log_(request.method + " " + request.target + " " + std::to_string(transfer.response.status));
-  if (!end) return tl::unexpected(kInterruptedFailure);
-  if (transfer.failure) return tl::unexpected(*transfer.failure);
-  if (*end != CURLE_OK) return tl::unexpected(broken(*end, server_));
+  if (!end) return {tl::unexpected(kInterruptedFailure)};
+  if (transfer.failure) return {tl::unexpected(*transfer.failure)};
+  if (*end != CURLE_OK) return {tl::unexpected(broken(*end, server_)), is_answer_lost(*end)};
 
   const char* content_type = nullptr;
   curl_easy_getinfo(handles_->easy, CURLINFO_CONTENT_TYPE, &content_type);
   if (content_type != nullptr) transfer.response.content_type = content_type;
-  return std::move(transfer.response);
+  return {std::move(transfer.response)};
 }
 
 }  // namespace volsmooth

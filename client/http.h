@@ -29,6 +29,9 @@ struct Request {
   /// Gets the body of a success piece by piece; a failure it returns ends the transfer. Empty: see
   /// `Response::body`.
   std::function<Expected<void>(std::string_view)> sink = {};
+  /// Lets the server tell a repetition from a new request. With one, a request whose answer got lost is sent
+  /// again, up to `kTries` times in all.
+  std::string idempotency_key = {};
   bool interruptible = true;
   std::chrono::seconds timeout{0};  ///< for all of it; 0: none, but see `kStalled` in http.cpp
 };
@@ -38,6 +41,9 @@ struct Response {
   std::string content_type;
   std::string body;
 };
+
+/// A key that no other request has.
+std::string new_idempotency_key();
 
 /// One server, spoken to over connections that are kept. An answer of any status is a response; only no
 /// answer, a broken one, or an interruption is a failure.
@@ -49,11 +55,19 @@ class HttpClient {
   HttpClient(ServerAddress server, std::string token, const Interruption& interruption, Log log = {});
   ~HttpClient();
 
+  static constexpr int kTries = 4;
   Expected<Response> send(const Request& request);
   const ServerAddress& server() const { return server_; }
 
  private:
   struct Handles;
+  /// Whether it is unknown what became of a request.
+  struct Outcome {
+    Expected<Response> response;
+    bool is_lost = false;
+  };
+  Outcome send_once(const Request& request);
+  bool is_worth_another(const Request& request, const Outcome& outcome, bool is_repetition) const;
 
   ServerAddress server_;
   std::string token_;

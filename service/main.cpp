@@ -36,6 +36,7 @@ struct Options {
   std::string dimse_listen;
   std::string log_level = "info";
   bool ephemeral = false;
+  int keep_days = 7;
   int scrub_days = 7;
   // Of the configuration file.
   std::vector<Node> nodes;
@@ -77,6 +78,12 @@ void declare(CLI::App& app, Options& options) {
   app.add_option("--max-upload", options.jobs.max_upload_bytes, "Largest upload, such as 16GB")
       ->envname("VOLSMOOTH_MAX_UPLOAD")
       ->transform(CLI::AsSizeValue(false))
+      ->capture_default_str();
+  app.add_option(
+         "--keep-days", options.keep_days,
+         "Days that volumes are kept after their upload, jobs and results after the job's end; 0: for ever")
+      ->envname("VOLSMOOTH_KEEP_DAYS")
+      ->check(CLI::Range(0, 36500))
       ->capture_default_str();
   app.add_option("--scrub-days", options.scrub_days,
                  "Every stored file is read and checked once in so many days; 0: only when it is asked for")
@@ -205,6 +212,7 @@ int run(int argc, char** argv) {
   }
   options.server.max_upload_bytes = options.jobs.max_upload_bytes;
   // The memory is said once, for the single job as for all that run together.
+  options.jobs.keep = std::chrono::days(options.keep_days);
   options.jobs.scrub_period = std::chrono::days(options.scrub_days);
   options.jobs = completed(std::move(options.jobs));
   options.server.max_connections =

@@ -2,6 +2,7 @@
 #include "service/http/entity_tag.h"
 #include "service/http/file_reply.h"
 #include "service/http/handlers.h"
+#include "service/http/idempotency.h"
 #include "service/http/problem_types.h"
 #include "service/http/query_values.h"
 #include "service/jobs/job_json.h"
@@ -30,9 +31,12 @@ Response accepted(const Job& job) {
   return created(document_of(job), 202, "/v1/jobs/" + job.id);
 }
 
-tl::expected<Job, Problem> submit_text(Api& api, const Request& request) {
+tl::expected<Job, Problem> submit_text(Api& api, Request& request) {
   return parse_json(request.text).and_then(order_from).and_then([&](const JobOrder& order) {
-    return api.jobs.submit(request.caller, order);
+    return once(
+        api.jobs, request, "job " + to_json(order).dump(),
+        [&](const std::optional<RequestKey>& key) { return api.jobs.submit(request.caller, order, key); },
+        [&](const std::string& id) { return api.jobs.job(request.caller, id); });
   });
 }
 
@@ -61,21 +65,28 @@ class VolumeForAJob {
 };
 
 /// Keeps the volume of a form and submits the order for it; leaves no volume behind without a job.
+tl::expected<Job, Problem> submit_volume(Api& api, Request& request, nlohmann::json document,
+                                         const std::optional<RequestKey>& key) {
+  const auto volume = api.jobs.keep_volume(request.caller, std::move(*request.file), {});
+  if (!volume) return tl::unexpected(volume.error());
+  VolumeForAJob unclaimed(api.jobs, request.caller, volume->id);
+  if (document.is_object()) document["volume"] = volume->id;
+  auto job = order_from(document).and_then(
+      [&](const JobOrder& order) { return api.jobs.submit(request.caller, order, key); });
+  if (job) unclaimed.taken();
+  return job;
+}
+
 tl::expected<Job, Problem> submit_form(Api& api, Request& request) {
-  auto document = parse_json(request.text);
+  const auto document = parse_json(request.text);
   if (!document) return tl::unexpected(document.error());
   if (document->is_object() && document->contains("volume"))
     return tl::unexpected(
         Problem{"unknown-field", "Beside an uploaded volume, the job names none.", {{"field", "volume"}}});
-
-  const auto volume = api.jobs.keep_volume(request.caller, std::move(*request.file), {});
-  if (!volume) return tl::unexpected(volume.error());
-  VolumeForAJob unclaimed(api.jobs, request.caller, volume->id);
-  if (document->is_object()) (*document)["volume"] = volume->id;
-  auto job = order_from(*document).and_then(
-      [&](const JobOrder& order) { return api.jobs.submit(request.caller, order); });
-  if (job) unclaimed.taken();
-  return job;
+  return once(
+      api.jobs, request, "form " + request.file->finish() + " " + document->dump(),
+      [&](const std::optional<RequestKey>& key) { return submit_volume(api, request, *document, key); },
+      [&](const std::string& id) { return api.jobs.job(request.caller, id); });
 }
 
 /// What is kept of an event has the problem as the jobs know it.

@@ -27,6 +27,8 @@ struct Request {
   QueryValues query;
   std::string text;                  ///< a JSON body
   std::optional<IncomingFile> file;  ///< an uploaded body
+  std::optional<std::string> idempotency_key = {};
+  std::shared_ptr<void> key_claim = {};  ///< holds that key
 };
 
 /// A body that is at hand.

@@ -40,6 +40,13 @@ json parameters_of(const Route& route) {
     for (const auto name : {"Content-Digest", "Repr-Digest"})
       parameters.push_back(
           header_parameter(name, "RFC 9530; a body with another SHA-256 is refused: 422 digest-mismatch."));
+  if (route.keyed)
+    parameters.push_back(header_parameter("Idempotency-Key",
+                                          "Of 1 to 255 characters. The same request with the same key makes "
+                                          "nothing twice within 24 hours: it is "
+                                          "answered with what the first one made, as it is now. Another "
+                                          "request with it: 422 idempotency-mismatch; "
+                                          "while the first is being answered: 409 idempotency-in-flight."));
   if (route.method == "DELETE")
     parameters.push_back(header_parameter(
         "If-Match", "The ETag that GET gave; what has changed since stays: 412 precondition-failed."));

@@ -39,6 +39,8 @@ constexpr auto kTypes = std::to_array<ProblemType>({
     {"delivery-refused", 502, "The destination refused results"},
     {"digest-mismatch", 422, "The body does not have the digest that was sent"},
     {"gone", 410, "It existed, and was deleted"},
+    {"idempotency-in-flight", 409, "The same request is being answered"},
+    {"idempotency-mismatch", 422, "The key was used for another request"},
     {"job-too-expensive", 422, "The job would take too long"},
     {"job-too-large", 422, "The job would take too much memory"},
     {"method-not-allowed", 405, "The method is not offered here"},

@@ -44,6 +44,7 @@ struct Route {
   std::vector<QueryParameter> query = {};
   BodyKind body = BodyKind::kNone;
   std::string_view body_schema = {};
+  bool keyed = false;  ///< whether it takes an Idempotency-Key
 };
 
 const std::vector<Route>& routes();

@@ -73,6 +73,8 @@ const json& fixed_schemas() {
         "created_at": {"type": "string", "format": "date-time"},
         "started_at": {"type": ["string", "null"], "format": "date-time"},
         "finished_at": {"type": ["string", "null"], "format": "date-time"},
+        "expires_at": {"description": "When it goes with its results; null until its end, or for ever.",
+                       "type": ["string", "null"], "format": "date-time"},
         "error": {"anyOf": [{"$ref": "#/components/schemas/Problem"}, {"type": "null"}]},
         "next_attempt_at": {"description": "When a source that could not give the series is asked again.",
                             "type": ["string", "null"], "format": "date-time"},
@@ -174,6 +176,8 @@ json order_schema(const std::vector<MethodInfo>& methods) {
       "outputs": {"type": "array", "default": ["nifti"],
         "description": "All but nifti need a DICOM input.",
         "items": {"enum": ["nifti", "dicom-series", "dicom-stl", "dicom-obj", "dicom-surface-segmentation"]}},
+      "keep_days": {"type": "integer", "minimum": 0, "maximum": 36500,
+                    "description": "Days after its end that the job and its results are kept, up to what the service is set to, which is the default. 0: for ever, where the service is set to that."},
       "label": {"type": "string", "description": "Free text of yours."}}
   })json");
   order["properties"]["method"]["enum"] = names;

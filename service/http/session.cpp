@@ -6,6 +6,7 @@
 
 #include "service/http/accept.h"
 #include "service/http/digest_check.h"
+#include "service/http/idempotency.h"
 #include "service/http/metrics.h"
 #include "service/http/problem_types.h"
 
@@ -92,6 +93,9 @@ Session::Awaitable<void> Session::serve(Exchange& exchange) {
     return receiver_for(exchange.route->body, exchange.request, context_.body_rules)
         .and_then([&](std::unique_ptr<BodyReceiver> made) {
           return with_digest_check(exchange.request.head, std::move(made));
+        })
+        .and_then([&](std::unique_ptr<BodyReceiver> made) {
+          return with_idempotency_key(context_.api.jobs, *exchange.route, exchange.request, std::move(made));
         });
   });
   if (receiver)

@@ -2,6 +2,7 @@
 #include "service/http/entity_tag.h"
 #include "service/http/file_reply.h"
 #include "service/http/handlers.h"
+#include "service/http/idempotency.h"
 #include "service/http/query_values.h"
 #include "service/jobs/job_json.h"
 
@@ -21,10 +22,15 @@ UploadOptions upload_options(const QueryValues& query) {
 }  // namespace
 
 Reply post_volume(Api& api, Request& request) {
-  return api.jobs.keep_volume(request.caller, std::move(*request.file), upload_options(request.query))
-      .map([](const StoredVolume& volume) {
-        return created(to_json(volume), 201, "/v1/volumes/" + volume.id);
-      });
+  std::string wanted = "volume " + request.file->finish();
+  for (const auto& [name, value] : request.query) wanted += " " + name + "=" + value;
+  const auto first = [&](const std::optional<RequestKey>& key) {
+    return api.jobs.keep_volume(request.caller, std::move(*request.file), upload_options(request.query), key);
+  };
+  const auto again = [&](const std::string& id) { return api.jobs.volume(request.caller, id); };
+  return once(api.jobs, request, wanted, first, again).map([](const StoredVolume& volume) {
+    return created(to_json(volume), 201, "/v1/volumes/" + volume.id);
+  });
 }
 
 Reply get_volumes(Api& api, Request& request) {

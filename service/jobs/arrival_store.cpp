@@ -21,7 +21,7 @@ bool ArrivalStore::add(std::string_view tenant, std::string_view preset, const F
           "tenant) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT DO UPDATE SET received_ms = "
           "excluded.received_ms",
           preset, instance.study_uid, instance.series_uid, instance.sop_instance_uid, file.name,
-          instance.offset, instance.bytes, milliseconds_of(now_in_milliseconds()), tenant);
+          instance.offset, instance.bytes, milliseconds_of(database_.now()), tenant);
     audit(database, preset, "instances received");
     const bool taken = database.query("SELECT 1 FROM arrivals WHERE file = ? LIMIT 1", file.name).step();
     if (taken) insert_file(database, file);

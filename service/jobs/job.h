@@ -56,6 +56,7 @@ struct StoredVolume {
   std::string sha256;           ///< of the bytes as uploaded, hex
   std::string block_sums = {};  ///< when it is stored; the store keeps them to itself
   Time created_at;
+  std::optional<Time> expires_at = {};  ///< none: it is kept until somebody deletes it
 };
 
 /// A series that a job is to fetch from a node of the configuration before it can run, or one that devices
@@ -76,7 +77,8 @@ struct JobOrder {
   std::string mesh_frame;           ///< "RAS", "LPS", or empty: the volume's own
   std::string voxel_type = "same";  ///< or "float32"
   std::vector<std::string> outputs = {"nifti"};
-  std::string destination;  ///< the node that gets the DICOM outputs; empty: none
+  std::string destination;            ///< the node that gets the DICOM outputs; empty: none
+  std::optional<int> keep_days = {};  ///< after the job's end; none: as the service does, 0: for ever
   std::string label;
 };
 
@@ -144,6 +146,8 @@ struct Job {
   Time created_at;
   std::optional<Time> started_at;
   std::optional<Time> finished_at;
+  std::chrono::milliseconds keep = {};  ///< after its end; 0: for ever
+  std::optional<Time> expires_at;       ///< of a final one
   std::optional<Problem> error;         ///< why it failed, or why it waits for its source
   std::optional<Time> next_attempt_at;  ///< of a job that waits for its source
   int source_tries = 0;                 ///< how often its source could not give the series

@@ -56,7 +56,7 @@ json to_json(const StoredVolume& volume) {
                    {"bytes", volume.bytes},
                    {"sha256", volume.sha256},
                    {"created_at", rfc3339(volume.created_at)},
-                   {"expires_at", nullptr}});
+                   {"expires_at", or_null(volume.expires_at)}});
   return document;
 }
 
@@ -90,6 +90,7 @@ json to_json(const Job& job) {
           {"created_at", rfc3339(job.created_at)},
           {"started_at", or_null(job.started_at)},
           {"finished_at", or_null(job.finished_at)},
+          {"expires_at", or_null(job.expires_at)},
           {"error", job.error ? to_json(*job.error) : json(nullptr)},
           {"next_attempt_at", or_null(job.next_attempt_at)},
           {"results", list_of(job.results)},
@@ -124,6 +125,7 @@ json to_json(const JobOrder& order) {
       document["source"]["preset"] = order.source->preset;
     }
   }
+  if (order.keep_days) document["keep_days"] = *order.keep_days;
   if (!order.destination.empty()) document["destination"] = order.destination;
   if (order.isovalues) document["isovalues"] = *order.isovalues;
   if (!order.mesh_frame.empty()) document["mesh_frame"] = order.mesh_frame;

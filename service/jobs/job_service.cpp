@@ -55,7 +55,8 @@ tl::expected<IncomingFile, Problem> JobService::begin_upload(std::optional<std::
 }
 
 tl::expected<StoredVolume, Problem> JobService::keep_volume(const Caller& caller, IncomingFile file,
-                                                            const UploadOptions& options) {
+                                                            const UploadOptions& options,
+                                                            const std::optional<RequestKey>& key) {
   if (file.bytes() > state_->settings.max_upload_bytes) return too_large(state_->settings.max_upload_bytes);
   StoredVolume volume;
   volume.sha256 = file.finish();
@@ -67,17 +68,28 @@ tl::expected<StoredVolume, Problem> JobService::keep_volume(const Caller& caller
   volume.options = options;
   volume.facts = *std::move(facts);
   volume.bytes = file.bytes();
-  volume.created_at = now_in_milliseconds();
+  volume.created_at = state_->database.now();
+  volume.expires_at = state_->expiry_of_volume(volume.created_at);
 
   state_->files.adopt(std::move(file), volume_file(volume.id));
   try {
-    state_->volumes.insert(volume);
+    state_->volumes.insert(volume, state_->remembering(key, volume.tenant, volume.id));
   } catch (...) {
     // If nobody knows whether the row is there, the next start sees, and sweeps the file if not.
     if (!state_->database.condemned()) state_->files.remove(volume_file(volume.id));
     throw;
   }
   return volume;
+}
+
+tl::expected<std::shared_ptr<void>, Problem> JobService::claim_key(const Caller& caller,
+                                                                   std::string_view key) {
+  return state_->keys.claim(caller.tenant, key);
+}
+
+tl::expected<std::optional<std::string>, Problem> JobService::made_by(const Caller& caller,
+                                                                      const RequestKey& key) {
+  return state_->keys.made(caller.tenant, key);
 }
 
 tl::expected<std::vector<ArrivedInstance>, Problem> JobService::receive(const Caller& caller,
@@ -130,7 +142,8 @@ tl::expected<void, Problem> JobService::delete_volume(const Caller& caller, std:
   return state_->unless_gone(caller, id, "volume");
 }
 
-tl::expected<Job, Problem> JobService::submit(const Caller& caller, const JobOrder& order) {
+tl::expected<Job, Problem> JobService::submit(const Caller& caller, const JobOrder& order,
+                                              const std::optional<RequestKey>& key) {
   if (auto checked = state_->check(order); !checked) return tl::unexpected(std::move(checked.error()));
   const auto no_volume = [] {
     return refuse("not-found", "There is no such volume.", {{"member", "volume"}});
@@ -152,8 +165,10 @@ tl::expected<Job, Problem> JobService::submit(const Caller& caller, const JobOrd
   job.memory_bytes = plan.memory_bytes;
   job.is_long = plan.is_long;
   job.progress.stage = "queued";
-  job.created_at = now_in_milliseconds();
-  switch (state_->jobs.insert(job, state_->settings.max_queued)) {
+  job.created_at = state_->database.now();
+  job.keep = order.keep_days ? std::chrono::days(*order.keep_days) : state_->settings.keep;
+  switch (
+      state_->jobs.insert(job, state_->settings.max_queued, state_->remembering(key, job.tenant, job.id))) {
     case JobStore::Insertion::kNoVolume:
       return no_volume();
     case JobStore::Insertion::kQueueFull:
@@ -216,11 +231,7 @@ tl::expected<bool, Problem> JobService::delete_job(const Caller& caller, std::st
       state_->jobs.remove(id, [&](const Job& job) { return is_wanted(state_->with_progress(job)); });
   if (!removed) return state_->unless_gone(caller, id, "job").map([] { return true; });
   if (!removed->removed) return false;
-  if (const auto running = state_->running.find(id)) running->interrupt(RunningJob::Interruption::kCancel);
-  for (const std::string& file : removed->arrived_files) state_->files.remove(file);
-  if (removed->job.state == JobState::kSucceeded) state_->files.remove(results_directory(removed->job));
-  if (!removed->was_final) state_->tell_final(removed->job);
-  state_->wakes.wake(removed->job.id);
+  state_->clean_up_after(*removed);
   return true;
 }
 
@@ -276,6 +287,10 @@ void JobService::on_final(std::function<void(const Job&)> observer) {
 
 void JobService::on_store_lost(std::function<void()> observer) {
   state_->database.on_condemned(std::move(observer));
+}
+
+void JobService::forget_expired() {
+  state_->expiry.forget_expired();
 }
 
 ServiceStatistics JobService::statistics() {

@@ -14,6 +14,7 @@
 #include "service/jobs/caller.h"
 #include "service/jobs/job.h"
 #include "service/jobs/pacs.h"
+#include "service/jobs/request_keys.h"
 #include "service/storage/checked_file.h"
 #include "service/storage/incoming_file.h"
 
@@ -31,6 +32,8 @@ struct JobServiceSettings {
   int max_queued = 10'000;
   std::chrono::milliseconds node_patience = std::chrono::hours(24);  ///< a node that is down is asked again
   std::chrono::milliseconds longest_node_pause = std::chrono::minutes(5);
+  /// Volumes so long after their upload, jobs and results after the job's end; 0: for ever.
+  std::chrono::days keep = std::chrono::days(7);
   std::chrono::milliseconds scrub_period =
       std::chrono::days(7);          ///< every stored file is read so often; 0: never
   std::function<Time()> clock = {};  ///< none: the machine's
@@ -99,7 +102,15 @@ class JobService {
 
   tl::expected<IncomingFile, Problem> begin_upload(std::optional<std::int64_t> declared_bytes);
   tl::expected<StoredVolume, Problem> keep_volume(const Caller& caller, IncomingFile file,
-                                                  const UploadOptions& options);
+                                                  const UploadOptions& options,
+                                                  const std::optional<RequestKey>& key = {});
+
+  /// Holds an Idempotency-Key as long as its request is being answered; idempotency-in-flight.
+  tl::expected<std::shared_ptr<void>, Problem> claim_key(const Caller& caller, std::string_view key);
+  /// The id of the volume or job that an earlier request with the key has made; idempotency-mismatch. What is
+  /// made with a key (`keep_volume`, `submit`) is remembered for a day.
+  tl::expected<std::optional<std::string>, Problem> made_by(const Caller& caller, const RequestKey& key);
+
   /// Takes DICOM instances that a device sends to a preset; durable when it returns. When its series has been
   /// quiet for a while, a job of the preset runs on it. Gives what was in the file.
   tl::expected<std::vector<ArrivedInstance>, Problem> receive(const Caller& caller, std::string_view preset,
@@ -110,7 +121,8 @@ class JobService {
   tl::expected<StoredFile, Problem> volume_content(const Caller& caller, std::string_view id);
   tl::expected<void, Problem> delete_volume(const Caller& caller, std::string_view id);
 
-  tl::expected<Job, Problem> submit(const Caller& caller, const JobOrder& order);
+  tl::expected<Job, Problem> submit(const Caller& caller, const JobOrder& order,
+                                    const std::optional<RequestKey>& key = {});
   tl::expected<Job, Problem> job(const Caller& caller, std::string_view id);
   tl::expected<JobPage, Problem> jobs(const Caller& caller, const JobQuery& query);
   tl::expected<Job, Problem> cancel(const Caller& caller,
@@ -142,6 +154,9 @@ class JobService {
   /// Called once, from any thread, when a commit failed so that only a restart can tell whether it stands:
   /// the process is to end, and the next start recovers. Set before `start`.
   void on_store_lost(std::function<void()> observer);
+
+  /// Removes what has been kept long enough; once started, it happens by itself within a second or two.
+  void forget_expired();
 
   ServiceStatistics statistics();
   std::optional<std::string> not_ready_because();  ///< none: ready

@@ -16,9 +16,9 @@ using nlohmann::json;
 
 constexpr std::string_view kSelectJob =
     "SELECT sequence, id, state, job_order, parameters, memory_bytes, created_ms, started_ms, finished_ms, "
-    "attempt, stage, fraction, error, deaths, cancel_requested, not_before_ms, source_tries, is_long, tenant "
-    "FROM "
-    "jobs ";
+    "attempt, stage, fraction, error, deaths, cancel_requested, not_before_ms, source_tries, is_long, "
+    "tenant, "
+    "keep_ms, expires_ms FROM jobs ";
 
 std::optional<Time> time_or_none(const Statement& row, int column) {
   if (row.is_null(column)) return std::nullopt;
@@ -65,6 +65,8 @@ JobStore::Listed job_from(Database& database, const Statement& row) {
   job.source_tries = static_cast<int>(row.integer(16));
   job.is_long = row.integer(17) != 0;
   job.tenant = row.text(18);
+  job.keep = std::chrono::milliseconds(row.integer(19));
+  job.expires_at = time_or_none(row, 20);
   if (job.state == JobState::kSucceeded) {
     job.results = results_of(database, sequence);
     if (!job.order.destination.empty()) job.delivery = delivery_of(database, sequence);
@@ -114,12 +116,12 @@ std::int64_t count(Database& database, std::string_view sql) {
 int insert_row(Database& database, const Job& job) {
   return database.run(
       "INSERT INTO jobs (id, volume, method, label, state, job_order, parameters, memory_bytes, created_ms, "
-      "is_long, stage, tenant) "
-      "SELECT ?1, ?2, ?3, ?4, 'queued', ?5, ?6, ?7, ?8, ?9, 'queued', ?10 "
+      "is_long, stage, tenant, keep_ms) "
+      "SELECT ?1, ?2, ?3, ?4, 'queued', ?5, ?6, ?7, ?8, ?9, 'queued', ?10, ?11 "
       "WHERE ?2 = '' OR EXISTS (SELECT 1 FROM volumes WHERE id = ?2 AND tenant = ?10)",
       job.id, job.order.volume, job.order.method, job.order.label, to_json(job.order).dump(),
       to_json(job.parameters).dump(), job.memory_bytes, milliseconds_of(job.created_at), job.is_long,
-      job.tenant);
+      job.tenant, job.keep.count());
 }
 
 void take_retrieved(Database& database, const std::string& job_id, const Retrieved& retrieved) {
@@ -179,7 +181,7 @@ std::vector<JobStore::Listed> JobStore::list(std::string_view tenant, const JobQ
 
 std::optional<Job> JobStore::claim(std::int64_t most_memory_bytes, Work work, bool long_ones) {
   const bool has_volume = work == Work::kCompute;
-  const std::int64_t now = milliseconds_of(now_in_milliseconds());
+  const std::int64_t now = milliseconds_of(database_.now());
   const auto oldest = [&](Database& database) {
     return database.query(
         "SELECT id, attempt, memory_bytes FROM jobs WHERE sequence = (SELECT min(sequence) FROM jobs "
@@ -205,7 +207,7 @@ bool JobStore::change_in(Database& database, const JobChange& change) {
   if (!can_become(change.from, change.to))
     throw std::logic_error("a job cannot become " + std::string(name_of(change.to)) + " from " +
                            std::string(name_of(change.from)));
-  const Time now = now_in_milliseconds();
+  const Time now = database_.now();
   const std::optional<Time> finished = is_final(change.to) ? std::optional(now) : std::nullopt;
   std::optional<std::int64_t> started_ms, finished_ms;
   if (change.to == JobState::kRunning) started_ms = milliseconds_of(now);
@@ -216,7 +218,8 @@ bool JobStore::change_in(Database& database, const JobChange& change) {
   const int changed = database.run(
       "UPDATE jobs SET state = ?4, attempt = attempt + (?4 = 'running'), deaths = deaths + ?5, "
       "started_ms = CASE ?4 WHEN 'running' THEN ?6 WHEN 'queued' THEN NULL ELSE started_ms END, "
-      "finished_ms = ?7, stage = ?8, fraction = ?9, error = ?10, not_before_ms = ?11, "
+      "finished_ms = ?7, expires_ms = CASE WHEN keep_ms > 0 THEN ?7 + keep_ms END, stage = ?8, fraction = "
+      "?9, error = ?10, not_before_ms = ?11, "
       "source_tries = source_tries + (?11 > 0) "
       "WHERE id = ?1 AND attempt = ?2 AND state = ?3 AND (cancel_requested = 0 OR ?4 = 'cancelled')",
       change.id, change.attempt, name_of(change.from), name_of(change.to), change.deaths, started_ms,
@@ -252,8 +255,9 @@ bool JobStore::is_wanted(std::string_view id) {
 }
 
 std::optional<JobStore::Removal> JobStore::remove(std::string_view id,
-                                                  const std::function<bool(const Job&)>& is_wanted) {
-  return database_.write([&](Database& database) -> std::optional<Removal> {
+                                                  const std::function<bool(const Job&)>& is_wanted,
+                                                  Burial reason) {
+  auto removal = database_.write([&](Database& database) -> std::optional<Removal> {
     std::optional<Job> job = find_in(database, id);
     if (!job) return std::nullopt;
     const bool was_final = is_final(job->state);
@@ -265,9 +269,20 @@ std::optional<JobStore::Removal> JobStore::remove(std::string_view id,
     auto arrived_files = forget_arrivals(database, id);
     forget_files_in(database, results_directory(*job));
     database.run("DELETE FROM jobs WHERE id = ?", id);
-    bury(database, id, job->tenant);
-    audit(database, id, "job deleted");
+    bury(database, id, job->tenant, reason, database_.now());
+    audit(database, id, reason == Burial::kExpired ? "job expired" : "job deleted");
     return Removal{*std::move(job), was_final, true, std::move(arrived_files)};
+  });
+  if (removal && removal->removed) database_.deleted_something();
+  return removal;
+}
+
+std::vector<std::string> JobStore::expired() {
+  return database_.read([&](Database& database) {
+    return all_of(database.query("SELECT id FROM jobs WHERE expires_ms <= ? AND NOT EXISTS "
+                                 "(SELECT 1 FROM deliveries WHERE job = jobs.sequence AND state = 'pending')",
+                                 milliseconds_of(database_.now())),
+                  [](const Statement& row) { return row.text(0); });
   });
 }
 

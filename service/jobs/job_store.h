@@ -75,7 +75,9 @@ class JobStore {
     bool removed;
     std::vector<std::string> arrived_files = {};  ///< to be removed: only the job needed them
   };
-  std::optional<Removal> remove(std::string_view id, const std::function<bool(const Job&)>& is_wanted);
+  std::optional<Removal> remove(std::string_view id, const std::function<bool(const Job&)>& is_wanted,
+                                Burial reason = Burial::kDeleted);
+  std::vector<std::string> expired();  ///< but not those whose results are still on their way to a node
 
   struct Interrupted {
     Job job;

@@ -17,6 +17,7 @@ using nlohmann::json;
 using Checked = tl::expected<void, Problem>;
 
 constexpr std::size_t kMostIsovalues = 32;
+constexpr int kMostDays = 36'500;
 constexpr std::size_t kLongestLabel = 200;
 constexpr std::array<std::string_view, 5> kOutputs = {"nifti", "dicom-series", "dicom-stl", "dicom-obj",
                                                       "dicom-surface-segmentation"};
@@ -204,12 +205,19 @@ Checked read_label(const json& value, JobOrder& order) {
   return {};
 }
 
+Checked read_keep_days(const json& value, JobOrder& order) {
+  if (!value.is_number_integer() || value < 0 || value > kMostDays)
+    return bad("keep_days", "a whole number of days, from 0 (for ever) to " + std::to_string(kMostDays));
+  order.keep_days = value.get<int>();
+  return {};
+}
+
 struct Member {
   std::string_view name;
   Checked (*read)(const json& value, JobOrder& order);
 };
 
-constexpr std::array<Member, 11> kMembers = {{{"volume", read_volume},
+constexpr std::array<Member, 12> kMembers = {{{"volume", read_volume},
                                               {"source", read_source},
                                               {"method", read_method},
                                               {"parameters", read_parameters},
@@ -219,6 +227,7 @@ constexpr std::array<Member, 11> kMembers = {{{"volume", read_volume},
                                               {"voxel_type", read_voxel_type},
                                               {"outputs", read_outputs},
                                               {"destination", read_destination},
+                                              {"keep_days", read_keep_days},
                                               {"label", read_label}}};
 
 std::string known_members() {

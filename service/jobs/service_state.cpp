@@ -41,7 +41,7 @@ JobService::State::State(JobServiceSettings given, Engine computing, Pacs networ
       engine(std::move(computing)),
       pacs(std::move(network)),
       files(settings.data_dir, settings.reserved_disk_bytes),
-      database(files.path_of("volsmooth.db")),
+      database(files.path_of("volsmooth.db"), settings.clock),
       stored_files(database, files),
       volumes(database),
       jobs(database),
@@ -52,12 +52,24 @@ JobService::State::State(JobServiceSettings given, Engine computing, Pacs networ
                     [this](const std::string& id) { wakes.wake(id); }),
       delivery_runner(pacs, stored_files, files, database, jobs, settings,
                       [this](const std::string& id) { wakes.wake(id); }),
+      keys(database),
+      expiry(database, jobs, volumes, keys,
+             {[this](const std::string& id) { expire_job(id); },
+              [this](const VolumeStore::Owned& volume) {
+                if (volumes.remove(volume.tenant, volume.id, Burial::kExpired) == VolumeStore::Removal::kDone)
+                  files.remove(volume_file(volume.id));
+              }},
+             stopping),
       scrubber(stored_files, settings.scrub_period, settings.clock, stopping),
       pool(settings.workers, [this] { return claim(JobStore::Work::kCompute); }),
       retrievals(kExchanges, [this] { return claim(JobStore::Work::kRetrieve); }),
       delivering(kExchanges, [this] { return delivery_runner.claim(); }),
       receiving(pacs.presets.empty() ? 0 : 1, [this] { return claim_arrivals(); }),
-      scrubbing(1, [this] { return scrubber.claim(); }) {
+      scrubbing(1, [this] { return scrubber.claim(); }),
+      forgetting(1, [this] {
+        expiry.forget_expired();
+        return WorkerPool::Work();
+      }) {
   check_presets();
   recover();
   sweep();
@@ -164,7 +176,7 @@ void JobService::State::forget_arrivals(const Job& job) {
 WorkerPool::Work JobService::State::claim_arrivals() {
   if (stopping) return {};
   for (const Preset& preset : pacs.presets) {
-    auto series = arrivals.quiet_since(preset.name, now_in_milliseconds() - preset.quiet);
+    auto series = arrivals.quiet_since(preset.name, database.now() - preset.quiet);
     if (series) return [this, &preset, series = *std::move(series)] { start_job_of(preset, series); };
   }
   return {};
@@ -179,7 +191,8 @@ void JobService::State::start_job_of(const Preset& preset, const ArrivalStore::Q
   job.order.source = series.source;
   job.parameters = job.order.parameters;
   job.progress.stage = "queued";
-  job.created_at = now_in_milliseconds();
+  job.created_at = database.now();
+  job.keep = job.order.keep_days ? std::chrono::days(*job.order.keep_days) : settings.keep;
   const auto outcome =
       jobs.insert(job, settings.max_queued, [&](Database& writer) { hand_over(writer, series, job.id); });
   if (outcome == JobStore::Insertion::kDone) {
@@ -187,6 +200,34 @@ void JobService::State::start_job_of(const Preset& preset, const ArrivalStore::Q
   } else {
     std::this_thread::sleep_for(std::chrono::seconds(1));
   }
+}
+
+void JobService::State::expire_job(const std::string& id) {
+  const auto removed = jobs.remove(
+      id, [](const Job& job) { return is_final(job.state); }, Burial::kExpired);
+  if (removed && removed->removed) clean_up_after(*removed);
+}
+
+void JobService::State::clean_up_after(const JobStore::Removal& removed) {
+  const Job& job = removed.job;
+  if (const auto still = running.find(job.id)) still->interrupt(RunningJob::Interruption::kCancel);
+  for (const std::string& file : removed.arrived_files) files.remove(file);
+  if (job.state == JobState::kSucceeded) files.remove(results_directory(job));
+  if (!removed.was_final) tell_final(job);
+  wakes.wake(job.id);
+}
+
+std::optional<Time> JobService::State::expiry_of_volume(Time created_at) const {
+  if (settings.keep.count() == 0) return std::nullopt;
+  return created_at + settings.keep;
+}
+
+std::function<void(Database&)> JobService::State::remembering(const std::optional<RequestKey>& key,
+                                                              const std::string& tenant,
+                                                              const std::string& id) {
+  return [this, &key, &tenant, &id](Database& writer) {
+    if (key) remember(writer, tenant, *key, id, database.now());
+  };
 }
 
 void JobService::State::tell_final(const Job& job) const {
@@ -213,8 +254,12 @@ tl::unexpected<Problem> JobService::State::missing(const Caller& caller, std::st
   const std::string name(what);
   if (!is_id_shaped(id))
     return refuse("bad-id", "This is not the id of a " + name + "; use the id that its creation gave.");
-  if (database.read([&](Database& reader) { return is_buried(reader, id, caller.tenant); }))
-    return refuse("gone", "This " + name + " was deleted.");
+  if (const auto reason =
+          database.read([&](Database& reader) { return burial_of(reader, id, caller.tenant); }))
+    return *reason == Burial::kExpired
+               ? refuse("gone", "This " + name + " was kept as long as it was to be, and has expired.",
+                        {{"reason", "expired"}})
+               : refuse("gone", "This " + name + " was deleted.", {{"reason", "deleted"}});
   return refuse("not-found", "There is no such " + name + ".");
 }
 
@@ -273,6 +318,10 @@ tl::expected<void, Problem> JobService::State::check(const JobOrder& order) cons
       return refuse("bad-parameter", "'mesh_formats' must be a list of formats that GET /v1/formats lists.",
                     {{"member", "mesh_formats"}, {"choices", names_of(engine.mesh_formats)}});
   if (auto nodes = check_nodes(order); !nodes) return nodes;
+  const auto days = settings.keep.count();
+  if (days > 0 && order.keep_days && (*order.keep_days == 0 || *order.keep_days > days))
+    return refuse("bad-parameter", "'keep_days' must be from 1 to " + std::to_string(days) + " here.",
+                  {{"member", "keep_days"}, {"minimum", 1}, {"maximum", days}});
   return check_parameters(order.parameters, *method);
 }
 

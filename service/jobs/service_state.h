@@ -9,6 +9,7 @@
 #include "service/jobs/arrival_store.h"
 #include "service/jobs/claimed_job.h"
 #include "service/jobs/delivery_runner.h"
+#include "service/jobs/expiry.h"
 #include "service/jobs/job_runner.h"
 #include "service/jobs/job_service.h"
 #include "service/jobs/job_store.h"
@@ -39,13 +40,17 @@ struct JobService::State {
   WorkerPool::Work claim(JobStore::Work work);
   bool settle(const JobChange& change);
   void tell_final(const Job& job) const;
+  void expire_job(const std::string& id);
+  void clean_up_after(const JobStore::Removal& removed);  ///< what was not rows
 
   // What devices send to presets.
   WorkerPool::Work claim_arrivals();  ///< of a series that has become whole: makes its job
   void start_job_of(const Preset& preset, const ArrivalStore::QuietSeries& series);
   void forget_arrivals(const Job& job);  ///< when it needs them no more
 
-  std::array<WorkerPool*, 5> pools() { return {&pool, &retrievals, &delivering, &receiving, &scrubbing}; }
+  std::array<WorkerPool*, 6> pools() {
+    return {&pool, &retrievals, &delivering, &receiving, &scrubbing, &forgetting};
+  }
 
   // Answers.
   /// What the engine says of an upload; not-ready when the service is stopped meanwhile.
@@ -56,6 +61,10 @@ struct JobService::State {
   /// The same, but deleted is what it should be.
   tl::expected<void, Problem> unless_gone(const Caller& caller, std::string_view id, std::string_view what);
   Job with_progress(Job job) const;
+  std::optional<Time> expiry_of_volume(Time created_at) const;
+  /// Remembers what a request with a key made; for the transaction that makes it.
+  std::function<void(Database&)> remembering(const std::optional<RequestKey>& key, const std::string& tenant,
+                                             const std::string& id);
   tl::expected<void, Problem> check(const JobOrder& order) const;
   tl::expected<void, Problem> check_nodes(const JobOrder& order) const;
   tl::expected<StoredFile, Problem> stored_file(const std::string& name, const std::string& media_type,
@@ -79,8 +88,11 @@ struct JobService::State {
   std::function<void(const Job&)> observer;
   std::mutex claiming;
   std::atomic<bool> started = false, stopping = false;
+  RequestKeys keys;
+  Expiry expiry;
   Scrubber scrubber;
-  WorkerPool pool, retrievals, delivering, receiving, scrubbing;  // last: their threads use all of the above
+  WorkerPool pool, retrievals, delivering, receiving, scrubbing,
+      forgetting;  // last: their threads use all of the above
 };
 
 }  // namespace volsmooth

@@ -64,7 +64,8 @@ tl::expected<StoredVolume, NodeFailure> SourceRunner::retrieve(ClaimedJob& claim
   volume.sha256 = file.finish();
   volume.block_sums = file.block_sums();
   volume.bytes = file.bytes();
-  volume.created_at = now_in_milliseconds();
+  volume.created_at = database_.now();
+  if (settings_.keep.count() > 0) volume.expires_at = volume.created_at + settings_.keep;
   auto facts = engine_.inspect(file.path(), volume.options, [&](double) { running.throw_if_interrupted(); });
   if (!facts) {
     const bool is_passing = facts.error().is_passing;
@@ -109,7 +110,7 @@ void SourceRunner::keep(ClaimedJob& claim, StoredVolume volume, IncomingFile fil
 }
 
 void SourceRunner::fail_or_wait(ClaimedJob& claim, NodeFailure failure) const {
-  const Time now = now_in_milliseconds();
+  const Time now = database_.now();
   if (!failure.is_passing || now - claim.job().created_at > settings_.node_patience)
     return claim.fail(std::move(failure.problem));
   claim.wait_until(now + pause_after(claim.job().source_tries, settings_.longest_node_pause),

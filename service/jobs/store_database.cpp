@@ -158,8 +158,31 @@ constexpr const char* kStoredFiles = R"(
     SELECT DISTINCT file, -1, '', '', 0 FROM arrivals;
 )";
 
+/// How long things are kept. What was stored before was stored for good, and stays.
+constexpr const char* kKeeping = R"(
+  ALTER TABLE volumes ADD COLUMN expires_ms INTEGER;
+  ALTER TABLE jobs ADD COLUMN keep_ms INTEGER NOT NULL DEFAULT 0;
+  ALTER TABLE jobs ADD COLUMN expires_ms INTEGER;
+  CREATE INDEX expiring_volumes ON volumes (expires_ms) WHERE expires_ms IS NOT NULL;
+  CREATE INDEX expiring_jobs ON jobs (expires_ms) WHERE expires_ms IS NOT NULL;
+  CREATE INDEX jobs_of_volumes ON jobs (volume) WHERE state IN ('queued', 'running');
+  ALTER TABLE tombstones ADD COLUMN reason TEXT NOT NULL DEFAULT 'deleted';
+  CREATE INDEX tombstones_by_age ON tombstones (deleted_ms);
+
+  CREATE TABLE request_keys (
+    tenant      TEXT NOT NULL,
+    key         TEXT NOT NULL,
+    fingerprint TEXT NOT NULL,
+    made        TEXT NOT NULL,
+    at_ms       INTEGER NOT NULL,
+    PRIMARY KEY (tenant, key)
+  ) STRICT, WITHOUT ROWID;
+  CREATE INDEX request_keys_by_age ON request_keys (at_ms);
+)";
+
 /// What makes each version of the schema of the one before.
-constexpr std::array kVersions = {kFirstSchema, kIndexByState, kNodes, kLongJobs, kTenants, kStoredFiles};
+constexpr std::array kVersions = {kFirstSchema, kIndexByState, kNodes,  kLongJobs,
+                                  kTenants,     kStoredFiles,  kKeeping};
 constexpr std::size_t kNewestVersion = kVersions.size();
 
 std::size_t schema_version(Database& database) {
@@ -193,8 +216,9 @@ std::int64_t prepare(Database& database) {
 
 }  // namespace
 
-StoreDatabase::StoreDatabase(const std::filesystem::path& file)
-    : writer_(file, Database::Access::kWriter),
+StoreDatabase::StoreDatabase(const std::filesystem::path& file, std::function<Time()> clock)
+    : clock_(std::move(clock)),
+      writer_(file, Database::Access::kWriter),
       start_number_(prepare(writer_)),
       reader_(file, Database::Access::kReader) {}
 
@@ -212,17 +236,45 @@ void audit(Database& database, std::string_view subject, std::string_view action
                milliseconds_of(now_in_milliseconds()), subject, action);
 }
 
-void bury(Database& database, std::string_view id, std::string_view tenant) {
-  database.run("INSERT INTO tombstones (id, deleted_ms, tenant) VALUES (?, ?, ?)", id,
-               milliseconds_of(now_in_milliseconds()), tenant);
+void StoreDatabase::forget_tombstones(Time before) {
+  constexpr std::string_view kOld = " FROM tombstones WHERE deleted_ms <= ?";
+  const std::int64_t before_ms = milliseconds_of(before);
+  if (!read([&](Database& database) {
+        return database.query("SELECT 1" + std::string(kOld) + " LIMIT 1", before_ms).step();
+      }))
+    return;
+  write([&](Database& database) { return database.run("DELETE" + std::string(kOld), before_ms); });
 }
 
-bool is_buried(Database& database, std::string_view id, std::string_view tenant) {
-  return database.query("SELECT 1 FROM tombstones WHERE id = ? AND tenant = ?", id, tenant).step();
+void StoreDatabase::clear_log() {
+  const std::lock_guard writing(writer_mutex_);
+  if (!log_holds_deleted_ || condemned()) return;
+  // Most of it while others read; what is left then is a moment's work, with nobody reading.
+  writer_.execute("PRAGMA wal_checkpoint(PASSIVE)");
+  const std::lock_guard reading(reader_mutex_);
+  Statement outcome = writer_.query("PRAGMA wal_checkpoint(TRUNCATE)");
+  outcome.step();
+  log_holds_deleted_ = outcome.integer(0) != 0;  // somebody else has the file open, such as a backup
+}
+
+void bury(Database& database, std::string_view id, std::string_view tenant, Burial reason, Time now) {
+  database.run("INSERT INTO tombstones (id, deleted_ms, tenant, reason) VALUES (?, ?, ?, ?)", id,
+               milliseconds_of(now), tenant, reason == Burial::kExpired ? "expired" : "deleted");
+}
+
+std::optional<Burial> burial_of(Database& database, std::string_view id, std::string_view tenant) {
+  Statement row = database.query("SELECT reason FROM tombstones WHERE id = ? AND tenant = ?", id, tenant);
+  if (!row.step()) return std::nullopt;
+  return row.text(0) == "expired" ? Burial::kExpired : Burial::kDeleted;
 }
 
 std::int64_t milliseconds_of(Time time) {
   return std::chrono::floor<std::chrono::milliseconds>(time.time_since_epoch()).count();
+}
+
+std::optional<std::int64_t> milliseconds_of(const std::optional<Time>& time) {
+  if (!time) return std::nullopt;
+  return milliseconds_of(*time);
 }
 
 Time time_of(std::int64_t milliseconds) {

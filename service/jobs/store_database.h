@@ -1,9 +1,11 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <mutex>
+#include <optional>
 #include <string_view>
 #include <utility>
 
@@ -12,15 +14,24 @@
 
 namespace volsmooth {
 
+/// Times are kept as milliseconds since 1970 UTC.
+std::int64_t milliseconds_of(Time time);
+std::optional<std::int64_t> milliseconds_of(const std::optional<Time>& time);
+Time time_of(std::int64_t milliseconds);
+Time now_in_milliseconds();
+
 /// The database of volumes and jobs: one connection that writes, one that reads, so that a reader never waits
 /// for a writer's fsync. Thread-safe.
 class StoreDatabase {
  public:
   /// Opens or creates it, checks it, and counts this start.
-  explicit StoreDatabase(const std::filesystem::path& file);
+  explicit StoreDatabase(const std::filesystem::path& file,
+                         std::function<Time()> clock = now_in_milliseconds);
 
   /// The number of this start of the daemon: 1, 2, ...
   std::int64_t start_number() const { return start_number_; }
+
+  Time now() const { return clock_(); }
 
   /// Runs `body(Database&)` on one state of the data.
   template <class Body>
@@ -40,6 +51,14 @@ class StoreDatabase {
     return result;
   }
 
+  /// To be called when something was deleted that nobody is to find any more: the next `clear_log` sees to
+  /// it.
+  void deleted_something() { log_holds_deleted_ = true; }
+  /// Empties the write-ahead log, which holds pages as they were, when something was deleted since the last
+  /// time.
+  void clear_log();
+  void forget_tombstones(Time before);
+
   /// True once it is open whether a commit will survive a restart; every write throws from then on.
   bool condemned() const { return writer_.condemned(); }
   /// Called once when that comes about. Set before other threads use the database.
@@ -48,8 +67,10 @@ class StoreDatabase {
  private:
   void commit(Transaction& transaction);
 
-  std::mutex writer_mutex_, reader_mutex_;
-  Database writer_;  // before the reader, which must be closed first
+  const std::function<Time()> clock_;
+  std::mutex writer_mutex_, reader_mutex_;      // where both are needed, in this order
+  std::atomic<bool> log_holds_deleted_ = true;  // what the last daemon did is not known
+  Database writer_;                             // before the reader, which must be closed first
   std::int64_t start_number_;
   Database reader_;
   std::function<void()> on_condemned_ = [] {};
@@ -58,12 +79,10 @@ class StoreDatabase {
 // The pieces that volumes and jobs share. Those that write belong into the caller's transaction.
 
 void audit(Database& database, std::string_view subject, std::string_view action);
-void bury(Database& database, std::string_view id, std::string_view tenant);  ///< leaves a tombstone
-bool is_buried(Database& database, std::string_view id, std::string_view tenant);
-
-/// Times are kept as milliseconds since 1970 UTC.
-std::int64_t milliseconds_of(Time time);
-Time time_of(std::int64_t milliseconds);
-Time now_in_milliseconds();
+/// Why there is nothing of an id any more.
+enum class Burial { kDeleted, kExpired };
+/// Leaves a tombstone.
+void bury(Database& database, std::string_view id, std::string_view tenant, Burial reason, Time now);
+std::optional<Burial> burial_of(Database& database, std::string_view id, std::string_view tenant);
 
 }  // namespace volsmooth

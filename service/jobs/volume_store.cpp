@@ -7,7 +7,7 @@ namespace volsmooth {
 namespace {
 
 constexpr std::string_view kSelectVolume =
-    "SELECT id, options, facts, bytes, sha256, created_ms, tenant FROM volumes ";
+    "SELECT id, options, facts, bytes, sha256, created_ms, tenant, expires_ms FROM volumes ";
 
 StoredVolume volume_from(const Statement& row) {
   StoredVolume volume;
@@ -18,6 +18,7 @@ StoredVolume volume_from(const Statement& row) {
   volume.sha256 = row.text(4);
   volume.created_at = time_of(row.integer(5));
   volume.tenant = row.text(6);
+  if (!row.is_null(7)) volume.expires_at = time_of(row.integer(7));
   return volume;
 }
 
@@ -31,10 +32,10 @@ int insert_volume(Database& database, const StoredVolume& volume) {
   audit(database, volume.id, "volume stored");
   insert_file(database, {volume_file(volume.id), volume.bytes, volume.sha256, volume.block_sums});
   return database.run(
-      "INSERT INTO volumes (id, options, facts, bytes, sha256, created_ms, tenant) VALUES (?, ?, ?, ?, ?, ?, "
-      "?)",
+      "INSERT INTO volumes (id, options, facts, bytes, sha256, created_ms, tenant, expires_ms) VALUES "
+      "(?, ?, ?, ?, ?, ?, ?, ?)",
       volume.id, options_to_json(volume.options).dump(), facts_to_json(volume.facts).dump(), volume.bytes,
-      volume.sha256, milliseconds_of(volume.created_at), volume.tenant);
+      volume.sha256, milliseconds_of(volume.created_at), volume.tenant, milliseconds_of(volume.expires_at));
 }
 
 std::optional<StoredVolume> VolumeStore::find(std::string_view tenant, std::string_view id) {
@@ -59,8 +60,20 @@ std::vector<std::string> VolumeStore::ids() {
   });
 }
 
-VolumeStore::Removal VolumeStore::remove(std::string_view tenant, std::string_view id) {
-  return database_.write([&](Database& database) {
+std::vector<VolumeStore::Owned> VolumeStore::expired() {
+  return database_.read([&](Database& database) {
+    return all_of(
+        database.query("SELECT tenant, id FROM volumes WHERE expires_ms <= ? AND NOT EXISTS "
+                       "(SELECT 1 FROM jobs WHERE volume = volumes.id AND state IN ('queued', 'running'))",
+                       milliseconds_of(database_.now())),
+        [](const Statement& row) {
+          return Owned{row.text(0), row.text(1)};
+        });
+  });
+}
+
+VolumeStore::Removal VolumeStore::remove(std::string_view tenant, std::string_view id, Burial reason) {
+  const Removal outcome = database_.write([&](Database& database) {
     const int removed = database.run(
         "DELETE FROM volumes WHERE id = ?1 AND tenant = ?2 AND NOT EXISTS "
         "(SELECT 1 FROM jobs WHERE volume = ?1 AND state IN ('queued', 'running'))",
@@ -70,10 +83,12 @@ VolumeStore::Removal VolumeStore::remove(std::string_view tenant, std::string_vi
                  ? Removal::kInUse
                  : Removal::kUnknown;
     forget_file(database, volume_file(id));
-    bury(database, id, tenant);
-    audit(database, id, "volume deleted");
+    bury(database, id, tenant, reason, database_.now());
+    audit(database, id, reason == Burial::kExpired ? "volume expired" : "volume deleted");
     return Removal::kDone;
   });
+  if (outcome == Removal::kDone) database_.deleted_something();
+  return outcome;
 }
 
 }  // namespace volsmooth

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -20,8 +21,13 @@ class VolumeStore {
  public:
   explicit VolumeStore(StoreDatabase& database) : database_(database) {}
 
-  void insert(const StoredVolume& volume) {
-    database_.write([&](Database& database) { return insert_volume(database, volume); });
+  /// `also` is done in the same transaction.
+  void insert(
+      const StoredVolume& volume, const std::function<void(Database&)>& also = [](Database&) {}) {
+    database_.write([&](Database& database) {
+      also(database);
+      return insert_volume(database, volume);
+    });
   }
   std::optional<StoredVolume> find(std::string_view tenant, std::string_view id);
   std::vector<StoredVolume> of_tenant(std::string_view tenant);  ///< newest first
@@ -29,7 +35,12 @@ class VolumeStore {
 
   enum class Removal { kDone, kInUse, kUnknown };
   /// Unless an unfinished job needs it.
-  Removal remove(std::string_view tenant, std::string_view id);
+  Removal remove(std::string_view tenant, std::string_view id, Burial reason = Burial::kDeleted);
+
+  struct Owned {
+    std::string tenant, id;
+  };
+  std::vector<Owned> expired();  ///< those that no unfinished job needs
 
  private:
   StoreDatabase& database_;

@@ -51,6 +51,12 @@ std::string Sha256::hex() {
   return text;
 }
 
+std::string sha256_of(std::string_view text) {
+  Sha256 sha256;
+  sha256.update(std::as_bytes(std::span(text)));
+  return sha256.hex();
+}
+
 FileDigest digest_of(const std::filesystem::path& file, const std::function<void()>& between_blocks) {
   const FileDescriptor input = open_file(file, O_RDONLY);
   std::vector<std::byte> block(kBlockBytes);

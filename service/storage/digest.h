@@ -7,6 +7,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 
 namespace volsmooth {
 
@@ -23,6 +24,9 @@ class Sha256 {
   };
   std::unique_ptr<void, Free> context_;
 };
+
+/// Of all of a text, hex.
+std::string sha256_of(std::string_view text);
 
 struct FileDigest {
   std::int64_t bytes = 0;

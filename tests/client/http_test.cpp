@@ -4,7 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <csignal>
+#include <fstream>
 
 #include "client/descriptor.h"
 #include "tests/client/canned_server.h"
@@ -160,6 +162,53 @@ TEST_F(Http, WhatMustGoThroughIsNotInterrupted) {
   const CannedServer server([](const auto&) { return canned(202, "{}"); });
   kill(getpid(), SIGTERM);
   EXPECT_TRUE(send(server, {.method = "POST", .target = "/v1/jobs/7/cancel", .interruptible = false}));
+}
+
+std::string key_in(const SeenRequest& request) {
+  const auto at = request.head.find("Idempotency-Key: ");
+  return at == std::string::npos ? "" : request.head.substr(at, request.head.find('\r', at) - at);
+}
+
+TEST_F(Http, SendsAKeyedRequestAgainWhenItsAnswerIsLost) {
+  std::atomic<int> count = 0;
+  const CannedServer server([&](const auto&) { return ++count < 3 ? CannedAnswer{} : canned(201, "{}"); });
+  const ScratchFolder folder;
+  std::ofstream(folder / "file") << "..voxels";
+  const Descriptor file(open((folder / "file").c_str(), O_RDONLY));
+  lseek(file.get(), 2, SEEK_SET);
+  const FileBody body{file.get(), 6};
+  const auto response = send(
+      server, {.method = "POST", .target = "/", .file = &body, .idempotency_key = new_idempotency_key()});
+  ASSERT_TRUE(response);
+  EXPECT_EQ(response->status, 201);
+  ASSERT_EQ(server.seen().size(), 3U);
+  for (const SeenRequest& request : server.seen()) {
+    EXPECT_EQ(request.body, "voxels");
+    EXPECT_EQ(key_in(request), key_in(server.seen()[0]));
+    EXPECT_GT(key_in(request).size(), 30U);
+  }
+}
+
+TEST_F(Http, WaitsForARequestOfItsOwnThatIsStillUnderWay) {
+  std::atomic<int> count = 0;
+  const CannedServer server([&](const auto&) {
+    const int now = ++count;
+    if (now == 1) return CannedAnswer{};
+    return now == 2 ? canned(409, R"({"type": "/problems/idempotency-in-flight"})") : canned(202, "{}");
+  });
+  EXPECT_EQ(send(server, {.method = "POST", .target = "/", .body = "{}", .idempotency_key = "k"})->status,
+            202);
+}
+
+TEST_F(Http, SendsNothingTwiceThatHasNoKeyOrWasAnswered) {
+  const CannedServer silent([](const auto&) { return CannedAnswer{}; });
+  EXPECT_FALSE(send(silent, {.method = "POST", .target = "/", .body = "{}"}));
+  EXPECT_EQ(silent.seen().size(), 1U);
+  const CannedServer refusing(
+      [](const auto&) { return canned(409, R"({"type": "/problems/idempotency-in-flight"})"); });
+  EXPECT_EQ(send(refusing, {.method = "POST", .target = "/", .body = "{}", .idempotency_key = "k"})->status,
+            409);
+  EXPECT_EQ(refusing.seen().size(), 1U);
 }
 
 }  // namespace

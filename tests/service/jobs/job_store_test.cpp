@@ -286,13 +286,20 @@ TEST(StoreDatabase, TakesOverWhatAnEarlierVersionWrote) {
         "TABLE arrivals; "
         "ALTER TABLE jobs DROP COLUMN not_before_ms; ALTER TABLE jobs DROP COLUMN source_tries; "
         "ALTER TABLE jobs DROP COLUMN is_long; DROP TABLE stored_files; "
+        "DROP TABLE request_keys; DROP INDEX expiring_volumes; DROP INDEX expiring_jobs; DROP INDEX "
+        "jobs_of_volumes; DROP INDEX tombstones_by_age; ALTER TABLE volumes DROP COLUMN expires_ms; ALTER "
+        "TABLE "
+        "jobs DROP COLUMN expires_ms; ALTER TABLE jobs DROP COLUMN keep_ms; ALTER TABLE tombstones DROP "
+        "COLUMN "
+        "reason; "
         "DROP INDEX volumes_by_tenant; DROP INDEX jobs_by_tenant; ALTER TABLE volumes DROP COLUMN tenant; "
         "ALTER TABLE jobs DROP COLUMN tenant; ALTER TABLE tombstones DROP COLUMN tenant; "
         "PRAGMA user_version = 1;");
   }
   StoreDatabase now(file);
   EXPECT_EQ(now.start_number(), 2);
-  EXPECT_TRUE(now.read([](Database& database) { return is_buried(database, "j-1", kDefaultTenant); }));
+  EXPECT_TRUE(now.read(
+      [](Database& database) { return burial_of(database, "j-1", kDefaultTenant) == Burial::kDeleted; }));
   EXPECT_EQ(now.read([](Database& database) {
     return all_of(database.query("SELECT name, bytes, sha256 FROM stored_files ORDER BY bytes"),
                   [](const Statement& row) { return row.text(0) + " " + row.text(1) + " " + row.text(2); });

@@ -132,6 +132,7 @@ class ScrubTest : public JobServiceTest {
   /// A service whose clock a test turns.
   void open_scrubbing() {
     auto wanted = settings();
+    wanted.keep = std::chrono::days(0);
     wanted.clock = [this] { return now_in_milliseconds() + ahead_.load(); };
     service_ = std::make_unique<JobService>(wanted, fake_.engine());
     service_->start();
