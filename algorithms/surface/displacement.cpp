@@ -4,10 +4,8 @@
 #include <numeric>
 
 #include "algorithms/surface/measures.h"
-#include "algorithms/surface/morton_order.h"
 #include "algorithms/surface/serial_for.h"
-#include "algorithms/surface/triangle_tree.h"
-#include "algorithms/surface/triangles_at_vertices.h"
+#include "algorithms/surface/triangle_grid.h"
 #include "algorithms/surface/vector_math.h"
 #include "algorithms/volume/parallel.h"
 
@@ -19,6 +17,7 @@ constexpr std::int64_t kPerChunk = 1 << 11;
 /// Triangles that are no caps. A cap says where the volume ends, not where the surface is.
 std::vector<std::uint32_t> free_triangles(const Mesh& mesh, const Progress& report) {
   std::vector<std::uint32_t> chosen;
+  chosen.reserve(mesh.triangles.size());
   serial_for(
       mesh.triangles.size(),
       [&](std::size_t begin, std::size_t end) {
@@ -50,21 +49,15 @@ std::vector<double> vertex_areas(const Mesh& mesh, const Progress& report) {
 /// The original surface without caps: nearest points, and the side they are seen from.
 class SignedDistance {
  public:
-  SignedDistance(const Mesh& mesh, std::vector<std::uint32_t> triangles, const Progress& report)
-      : mesh_(mesh),
-        at_vertices_(mesh, part_of(report, 0, 0.4)),
-        tree_(mesh, std::move(triangles), part_of(report, 0.4, 1)) {}
+  SignedDistance(const Mesh& mesh, const std::vector<std::uint32_t>& triangles, const VoxelToWorld& map,
+                 const Progress& report)
+      : mesh_(mesh), grid_(mesh, triangles, map, report) {}
 
-  /// Of points near one another, `TriangleTree::kPoints` at the most: positive outside. `guess` is a triangle
-  /// to start from, and becomes the one nearest to the last point.
-  void operator()(std::span<const Float3> from, std::uint32_t& guess, std::span<double> distances) const {
-    std::array<NearestPoint, TriangleTree::kPoints> nearest;
-    tree_.nearest(from, guess, nearest);
-    for (std::size_t p = 0; p < from.size(); ++p) {
-      distances[p] = std::copysign(std::sqrt(nearest[p].squared_distance),
-                                   dot(to_double(from[p]) - nearest[p].point, normal_at(nearest[p])));
-    }
-    guess = nearest[from.size() - 1].triangle;
+  /// Positive outside. `guess` is a triangle to start from, and becomes the nearest one.
+  double operator()(const Vector3& from, std::uint32_t& guess) const {
+    const NearestPoint nearest = grid_.nearest(from, guess);
+    guess = nearest.triangle;
+    return std::copysign(std::sqrt(nearest.squared_distance), dot(from - nearest.point, normal_at(nearest)));
   }
 
  private:
@@ -75,13 +68,12 @@ class SignedDistance {
     if (nearest.corners == 7) return area_normal(corners_of(mesh_, face));
     Vector3 sum{};
     const auto first = static_cast<std::size_t>(nearest.corners & 1u ? 0 : nearest.corners & 2u ? 1 : 2);
-    for (std::uint32_t t : at_vertices_.at(face[first])) {
+    for (const std::uint32_t t : grid_.near(nearest.point)) {
       const Triangle& other = mesh_.triangles[t];
       const bool holds_all = std::ranges::all_of(std::array<std::size_t, 3>{0, 1, 2}, [&](std::size_t c) {
         return (nearest.corners >> c & 1u) == 0 || std::ranges::find(other, face[c]) != other.end();
       });
-      if (holds_all && mesh_.triangle_on_cap[t] == 0)
-        sum = sum + weighted_normal(other, face[first], nearest.corners);
+      if (holds_all) sum = sum + weighted_normal(other, face[first], nearest.corners);
     }
     return sum;
   }
@@ -100,8 +92,7 @@ class SignedDistance {
   }
 
   const Mesh& mesh_;
-  TrianglesAtVertices at_vertices_;
-  TriangleTree tree_;
+  TriangleGrid grid_;
 };
 
 struct Part {
@@ -118,37 +109,24 @@ struct Part {
 
 }  // namespace
 
-std::optional<Displacement> displacement(const Mesh& moved, const Mesh& original, const Progress& report) {
-  std::vector<std::uint32_t> triangles = free_triangles(original, part_of(report, 0, 0.02));
+std::optional<Displacement> displacement(const Mesh& moved, const Mesh& original, const VoxelToWorld& map,
+                                         const Progress& report) {
+  const std::vector<std::uint32_t> triangles = free_triangles(original, part_of(report, 0, 0.05));
   if (triangles.empty()) return std::nullopt;
-  const std::uint32_t start = triangles.front();
-  const std::vector<double> areas = vertex_areas(moved, part_of(report, 0.02, 0.05));
-  const SignedDistance distance(original, std::move(triangles), part_of(report, 0.05, 0.15));
+  const std::vector<double> areas = vertex_areas(moved, part_of(report, 0.05, 0.15));
+  const SignedDistance distance(original, triangles, map, part_of(report, 0.15, 0.35));
 
-  // Along the curve the nearest triangle of one vertex is a good guess for the next.
-  const std::vector<std::uint32_t> order = morton_order(moved.positions, part_of(report, 0.15, 0.2));
   std::vector<Part> parts(moved.positions.size() / kPerChunk + 1);
   parallel_for(
       static_cast<std::int64_t>(moved.positions.size()), kPerChunk,
       [&](std::int64_t begin, std::int64_t end) {
         Part& part = parts[static_cast<std::size_t>(begin / kPerChunk)];
-        std::uint32_t guess = start;
-        std::array<Float3, TriangleTree::kPoints> points;
-        std::array<double, TriangleTree::kPoints> weights, moved_by;
-        std::size_t waiting = 0;
-        for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k) {
-          const std::uint32_t v = order[k];
-          if (areas[v] > 0) {
-            points[waiting] = moved.positions[v];
-            weights[waiting++] = areas[v];
-          }
-          if (waiting < points.size() && (k + 1 < static_cast<std::size_t>(end) || waiting == 0)) continue;
-          distance(std::span(points).first(waiting), guess, moved_by);
-          for (std::size_t p = 0; p < waiting; ++p) part.add(weights[p], moved_by[p]);
-          waiting = 0;
+        std::uint32_t guess = triangles.front();
+        for (auto v = static_cast<std::size_t>(begin); v < static_cast<std::size_t>(end); ++v) {
+          if (areas[v] > 0) part.add(areas[v], distance(to_double(moved.positions[v]), guess));
         }
       },
-      part_of(report, 0.2, 1));
+      part_of(report, 0.35, 1));
 
   Part all;
   for (const Part& part : parts) {

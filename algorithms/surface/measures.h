@@ -29,8 +29,9 @@ struct Displacement {
   double max_mm = 0;
 };
 
-/// None when one of the surfaces has nothing but caps: there is no distance then.
+/// None when one of the surfaces has nothing but caps: there is no distance then. `map`: of the volume that
+/// `original` was made of, in the frame of both.
 std::optional<Displacement> displacement(const Mesh& moved, const Mesh& original,
-                                         const Progress& report = no_progress);
+                                         const VoxelToWorld& map = {}, const Progress& report = no_progress);
 
 }  // namespace volsmooth

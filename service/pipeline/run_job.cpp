@@ -80,11 +80,15 @@ class JobRun {
     return {otsu_threshold(*original_, progress, description_.padding_value)};
   }
 
-  std::vector<Mesh> surfaces_of(const Volume& volume) {
+  VoxelToWorld map_of_surfaces() const {
     const Frame frame = task_.order.mesh_frame.empty()    ? description_.map.frame
                         : task_.order.mesh_frame == "LPS" ? Frame::kLps
                                                           : Frame::kRas;
-    const VoxelToWorld map = in_frame(description_.map, frame);
+    return in_frame(description_.map, frame);
+  }
+
+  std::vector<Mesh> surfaces_of(const Volume& volume) {
+    const VoxelToWorld map = map_of_surfaces();
     std::vector<Mesh> surfaces;
     for (const double isovalue : isovalues_) {
       clock_.run("surfaces", kSurfaceCost / 2 * voxels_, [&](const Progress& progress) {
@@ -196,7 +200,7 @@ class JobRun {
         warnings_.push_back("no-surface: " + method + " leaves nothing at isovalue " +
                             isovalue_text(isovalues_[which]) + ", so there is no file for it.");
       } else {
-        row.moved = displacement(surface, original_surfaces_[which], progress);
+        row.moved = displacement(surface, original_surfaces_[which], map_of_surfaces(), progress);
       }
     });
     surface_rows_.push_back(std::move(row));
@@ -260,7 +264,7 @@ class JobRun {
   const std::vector<Part> parts_;
   const PipelineLimits& limits_;
   const std::int64_t
-      surface_bytes_;  ///< that one surface may take: its job holds it, the original's and a search tree
+      surface_bytes_;  ///< that one surface may take: its job holds it, the original's and a grid to search
   DicomResults dicom_;
   const double voxels_;
   StageClock clock_;

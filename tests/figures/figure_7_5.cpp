@@ -5,7 +5,7 @@
 #include "algorithms/flows/mean_curvature_flow.h"
 #include "algorithms/surface/isosurface.h"
 #include "algorithms/surface/measures.h"
-#include "algorithms/surface/triangle_tree.h"
+#include "algorithms/surface/triangle_grid.h"
 #include "algorithms/surface/vector_math.h"
 #include "tests/figures/models.h"
 #include "tests/figures/rendering.h"
@@ -29,12 +29,11 @@ constexpr Smoothed kMethods[] = {
 std::vector<double> distances(const Mesh& moved, const Mesh& original) {
   std::vector<std::uint32_t> triangles(original.triangles.size());
   std::iota(triangles.begin(), triangles.end(), 0U);
-  const TriangleTree tree(original, triangles);
+  const TriangleGrid grid(original, triangles, {});
   std::vector<double> distances;
   std::uint32_t guess = 0;
   for (const Float3& position : moved.positions) {
-    NearestPoint nearest;
-    tree.nearest({&position, 1}, guess, {&nearest, 1});
+    const NearestPoint nearest = grid.nearest(to_double(position), guess);
     guess = nearest.triangle;
     const Vector3 away = to_double(position) - nearest.point;
     distances.push_back(
