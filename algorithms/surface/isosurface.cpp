@@ -96,32 +96,68 @@ void write_triangles(const VertexNumbers& numbers, const CellRows& rows,
       part_of(report, 0.4, 1));
 }
 
+/// Writes the vertices of a mesh, those that can wait together in packets.
+class VertexWriter {
+ public:
+  VertexWriter(const VertexGeometry& geometry, Mesh& mesh)
+      : geometry_(geometry), mesh_(mesh), packet_(geometry.empty_packet()) {}
+
+  void write_on_edge(std::size_t vertex, const Size3& voxel, std::size_t axis) {
+    if (!geometry_.fits_packet(voxel, axis)) return write(vertex, geometry_.on_edge(voxel, axis));
+    geometry_.fill(packet_, waiting_, voxel, axis);
+    vertices_[waiting_++] = vertex;
+    if (waiting_ == vertices_.size()) finish();
+  }
+
+  void write(std::size_t vertex, const SurfaceVertex& what) {
+    mesh_.positions[vertex] = what.position;
+    mesh_.normals[vertex] = what.normal;
+    mesh_.curvatures[vertex] = what.curvature;
+  }
+
+  /// Writes those that still wait.
+  void finish() {
+    static const auto complete = vertex_packet_kernel(instruction_sets().back());
+    complete({&packet_});
+    for (std::size_t p = 0; p < waiting_; ++p) {
+      for (std::size_t a = 0; a < 3; ++a) {
+        mesh_.positions[vertices_[p]][a] = packet_.position[a][p];
+        mesh_.normals[vertices_[p]][a] = packet_.normal[a][p];
+      }
+      mesh_.curvatures[vertices_[p]] = packet_.curvature[p];
+    }
+    waiting_ = 0;
+  }
+
+ private:
+  const VertexGeometry& geometry_;
+  Mesh& mesh_;
+  VertexPacket packet_;
+  std::array<std::size_t, VertexPacket::kVertices> vertices_{};
+  std::size_t waiting_ = 0;
+};
+
 void write_vertices(const VertexNumbers& numbers, const VertexGeometry& geometry, Mesh& mesh,
                     const Progress& report) {
   const CutRows& cut = numbers.cut();
   grow(mesh.positions, numbers.count(), part_of(report, 0, 0.05));
   grow(mesh.normals, numbers.count(), part_of(report, 0.05, 0.1));
   grow(mesh.curvatures, numbers.count(), part_of(report, 0.1, 0.12));
-  const auto write_row = [&](std::int64_t y, std::int64_t z) {
+  const auto write_row = [&](std::int64_t y, std::int64_t z, VertexWriter& writer) {
     std::size_t next = numbers.row(y, z).on_edges[0];
-    const auto write = [&](const SurfaceVertex& vertex) {
-      mesh.positions[next] = vertex.position;
-      mesh.normals[next] = vertex.normal;
-      mesh.curvatures[next++] = vertex.curvature;
-    };
     const auto for_each_bit = [](std::uint64_t bits, std::int64_t word, const auto& visit) {
       for (; bits != 0; bits &= bits - 1) visit(64 * word + std::countr_zero(bits) - 1);
     };
     for (std::size_t axis = 0; axis < 3; ++axis) {
       for (std::int64_t word = 0; word < cut.words(); ++word) {
         for_each_bit(cut.cut_edges(y, z, axis, word), word, [&](std::int64_t x) {
-          write(geometry.on_edge({x, y, z}, axis));
+          writer.write_on_edge(next++, {x, y, z}, axis);
         });
       }
     }
     for (std::int64_t word = 0; word < cut.words(); ++word) {
       for_each_bit(cut.border_voxels(y, z, word), word, [&](std::int64_t x) {
-        write(geometry.on_border({x, y, z}));
+        writer.write(next++, geometry.on_border({x, y, z}));
       });
     }
   };
@@ -129,7 +165,9 @@ void write_vertices(const VertexNumbers& numbers, const VertexGeometry& geometry
   parallel_for(
       rows * cut.size()[2], kRowsPerChunk,
       [&](std::int64_t begin, std::int64_t end) {
-        for (std::int64_t r = begin; r < end; ++r) write_row(r % rows, r / rows);
+        VertexWriter writer(geometry, mesh);
+        for (std::int64_t r = begin; r < end; ++r) write_row(r % rows, r / rows, writer);
+        writer.finish();
       },
       part_of(report, 0.12, 1));
 }

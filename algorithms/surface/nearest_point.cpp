@@ -37,6 +37,7 @@ NearestPoint nearest_point(const Mesh& mesh, std::uint32_t triangle, const Vecto
     return NearestPoint{dot(difference, difference), triangle, point, corners};
   };
   const Vector3 ab = b - a, ac = c - a;
+  if (a == b || b == c || c == a) return nearest_of_sides(mesh, triangle, from);
   const double a1 = dot(ab, from - a), a2 = dot(ac, from - a);
   if (a1 <= 0 && a2 <= 0) return found(a, 1);
   const double b1 = dot(ab, from - b), b2 = dot(ac, from - b);

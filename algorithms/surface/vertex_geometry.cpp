@@ -7,13 +7,6 @@
 namespace volsmooth {
 namespace {
 
-Vector3 times(const Matrix3& m, const Vector3& v) {
-  Vector3 product;
-  for (std::size_t row = 0; row < 3; ++row)
-    product[row] = m[row][0] * v[0] + m[row][1] * v[1] + m[row][2] * v[2];
-  return product;
-}
-
 Vector3 transposed_times(const Matrix3& m, const Vector3& v) {
   Vector3 product;
   for (std::size_t col = 0; col < 3; ++col)
@@ -88,6 +81,41 @@ SurfaceVertex VertexGeometry::on_edge(const Size3& voxel, std::size_t axis) cons
   return {position(index), unit_normal(gradient), static_cast<float>(curvature)};
 }
 
+bool VertexGeometry::fits_packet(const Size3& voxel, std::size_t axis) const {
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (voxel[a] < 1 || voxel[a] + (a == axis ? 1 : 0) > size_[a] - 2) return false;
+  }
+  return true;
+}
+
+VertexPacket VertexGeometry::empty_packet() const {
+  VertexPacket packet{};
+  packet.isovalue = isovalue_;
+  packet.margin = margin_;
+  packet.map = map_;
+  packet.world_to_voxel = world_to_voxel_;
+  packet.inverse_metric = inverse_metric_;
+  return packet;
+}
+
+void VertexGeometry::fill(VertexPacket& packet, std::size_t place, const Size3& voxel,
+                          std::size_t axis) const {
+  const float* lowest = voxels_ + (voxel[0] - 1) + (voxel[1] - 1) * stride_[1] + (voxel[2] - 1) * stride_[2];
+  for (std::size_t end = 0; end < 2; ++end, lowest += stride_[axis]) {
+    std::size_t k = 0;
+    for (std::int64_t z = 0; z < 3; ++z) {
+      for (std::int64_t y = 0; y < 3; ++y) {
+        const float* row = lowest + y * stride_[1] + z * stride_[2];
+        for (std::int64_t x = 0; x < 3; ++x) packet.around[end][k++][place] = row[x];
+      }
+    }
+  }
+  for (std::size_t a = 0; a < 3; ++a) {
+    packet.index[a][place] = static_cast<double>(voxel[a]);
+    packet.along[a][place] = a == axis ? 1 : 0;
+  }
+}
+
 SurfaceVertex VertexGeometry::on_border(const Size3& voxel) const {
   Vector3 index, outward{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -123,28 +151,13 @@ double VertexGeometry::curvature_at(const Size3& voxel) const {
     next[axis] = at < last ? stride_[axis] : 0;
     previous[axis] = at > 0 ? stride_[axis] : 0;
   }
-  double divergence = 0;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    if (next[axis] != 0) divergence += flux(centre, axis, next, previous);
-    if (previous[axis] != 0) divergence -= flux(centre - stride_[axis], axis, next, previous);
-  }
-  return -divergence;
-}
-
-/// (G^-1 d)_axis / sqrt(d^T G^-1 d) on the face between `voxel` and its next neighbour; d = grad rho in
-/// voxel indices.
-double VertexGeometry::flux(const float* voxel, std::size_t axis, const Size3& next,
-                            const Size3& previous) const {
-  const float* beyond = voxel + stride_[axis];
-  Vector3 d;
-  for (std::size_t a = 0; a < 3; ++a) {
-    d[a] = a == axis ? double{*beyond} - double{*voxel}
-                     : 0.25 * (double{voxel[next[a]]} - double{voxel[-previous[a]]} +
-                               double{beyond[next[a]]} - double{beyond[-previous[a]]});
-  }
-  const Vector3 raised = times(inverse_metric_, d);
-  const double length = std::sqrt(dot(raised, d));
-  return length > 0 ? raised[axis] / length : 0;
+  const auto rho = [&](const VoxelOffset& at) {
+    const float* voxel_there = centre;
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      voxel_there += at[axis] * (at[axis] > 0 ? next : previous)[axis];
+    return double{*voxel_there};
+  };
+  return face_curvature<double>(rho, inverse_metric_);
 }
 
 Float3 VertexGeometry::unit_normal(const Vector3& inward_covector) const {

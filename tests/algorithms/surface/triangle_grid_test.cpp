@@ -69,6 +69,18 @@ TEST(NearestPointOfATriangle, IsNoFartherThanAnyPointOfIt) {
   }
 }
 
+TEST(NearestPointOfATriangle, WithTwoEqualCornersIsThatOfItsSide) {
+  const Float3 start{0, 0, 0}, end{2, 0, 0};
+  Mesh mesh;
+  mesh.positions = {start, end};
+  mesh.triangles = {{0, 0, 1}, {0, 1, 0}, {1, 0, 0}, {1, 1, 0}, {1, 0, 1}, {0, 1, 1}};
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    EXPECT_EQ(nearest_point(mesh, t, {1, 3, 0}).squared_distance, 9);
+    EXPECT_EQ(nearest_point(mesh, t, {-3, 0, 4}).squared_distance, 25);
+    EXPECT_EQ(nearest_point(mesh, t, {4, 0, 0}).squared_distance, 4);
+  }
+}
+
 /// Cells of one mm, of many sizes along the axes, turned, sheared, mirrored; so small that they would be too
 /// many; and so large that one holds everything.
 std::vector<VoxelToWorld> maps() {
