@@ -7,7 +7,7 @@
 namespace volsmooth {
 
 /// Rough seconds per voxel on two cores, good enough to weigh the stages against each other in the progress.
-inline constexpr double kReadCost = 12e-9, kStepCost = 1.2e-9, kMeasureCost = 1e-9, kSurfaceCost = 20e-9,
+inline constexpr double kReadCost = 12e-9, kStepCost = 3e-9, kMeasureCost = 1e-9, kSurfaceCost = 12e-9,
                         kWriteCost = 15e-9, kMeshWriteCost = 5e-9;
 
 /// Rough seconds that the parts of a job take together.

@@ -3,7 +3,9 @@
 // time from nested spheres on 128^3 to a flow time, beside ITK's, with the errors of both.
 #include <benchmark/benchmark.h>
 #include <itkCurvatureFlowImageFilter.h>
+#include <itkLaplacianImageFilter.h>
 #include <itkMultiThreaderBase.h>
+#include <itkSmoothingRecursiveGaussianImageFilter.h>
 
 #include <algorithm>
 #include <cmath>
@@ -14,8 +16,10 @@
 #include "algorithms/flows/laplacian_sweep.h"
 #include "algorithms/flows/mean_curvature_flow.h"
 #include "algorithms/flows/mean_curvature_sweep.h"
+#include "algorithms/flows/offset_sweep.h"
 #include "algorithms/volume/parallel.h"
 #include "tests/benchmarks/rounds.h"
+#include "tests/support/peak_memory.h"
 #include "tests/support/phantoms.h"
 
 namespace volsmooth {
@@ -55,6 +59,17 @@ void laplacian() {
   laplacian_step(voxels_of(*data().volume), data().next, data().grid, kStep);
 }
 
+void offset() {
+  offset_stage(voxels_of(*data().volume), data().next, data().grid, {.step_mm = 0.1, .range = 1000});
+}
+
+void itk_laplacian(int threads) {
+  auto filter = itk::LaplacianImageFilter<Volume, Volume>::New();
+  filter->SetInput(data().volume);
+  filter->SetNumberOfWorkUnits(static_cast<itk::ThreadIdType>(threads));
+  filter->Update();
+}
+
 /// Several, so that what the filter does once a call does not count.
 constexpr unsigned kItkIterations = 3;
 
@@ -80,6 +95,8 @@ void flow_steps(benchmark::State& state) {
       const double curvature = seconds(mean_curvature);
       const double default_curvature = seconds(face_centred);
       const double heat = seconds(laplacian);
+      const double offset_step = seconds(offset);
+      const double itk_heat = seconds([&] { itk_laplacian(threads); });
       const double itk =
           seconds([&] { itk_curvature_flow(*data().volume, kItkIterations, kStep, threads); }) /
           kItkIterations;
@@ -93,6 +110,8 @@ void flow_steps(benchmark::State& state) {
       rounds.add("itk_over_face_centred", itk / default_curvature);
       rounds.add("mcf_over_copy", curvature / streaming);
       rounds.add("laplacian_over_copy", heat / streaming);
+      rounds.add("offset_over_copy", offset_step / streaming);
+      rounds.add("itk_over_laplacian", itk_heat / heat);
     }
   });
   rounds.report(state);
@@ -139,6 +158,15 @@ double itk_error(double time, const std::vector<float>& before, const std::vecto
                           exact);
 }
 
+/// A Gaussian of the standard deviation that the heat equation makes of a point.
+void itk_gaussian(Volume& volume, double time) {
+  auto filter = itk::SmoothingRecursiveGaussianImageFilter<Volume, Volume>::New();
+  filter->SetInput(&volume);
+  filter->SetSigma(std::sqrt(2 * time));
+  filter->SetNumberOfWorkUnits(1);
+  filter->Update();
+}
+
 void time_to_result(benchmark::State& state) {
   constexpr unsigned kTimedIterations = 8;
   const auto time = static_cast<double>(state.range(0));
@@ -158,8 +186,10 @@ void time_to_result(benchmark::State& state) {
       const double explicit_flow = processor_seconds(
           [&] { smooth(*stepwise, MeanCurvatureFlow{.flow_time_mm2 = time, .tolerance_voxels = 0}); });
       const double heat = processor_seconds([&] { smooth(*heated, Laplacian{time}); });
+      const double gaussian = processor_seconds([&] { itk_gaussian(*given, time); });
       state.SetIterationTime(flow);
       rounds.add("flow_seconds", flow);
+      rounds.add("itk_gaussian_over_heat", gaussian / heat);
       rounds.add("itk_over_flow", itk / flow);
       rounds.add("itk_over_explicit", itk / explicit_flow);
       rounds.add("itk_over_heat", itk / heat);
@@ -172,6 +202,34 @@ void time_to_result(benchmark::State& state) {
 }
 
 BENCHMARK(time_to_result)->Arg(1)->Arg(10)->Arg(100)->ArgName("flow_time")->Iterations(5)->UseManualTime();
+
+// ---- memory
+// ------------------------------------------------------------------------------------------------
+
+/// Peaks of memory, the volume itself among them, in volumes of float.
+void flow_memory(benchmark::State& state) {
+  constexpr double kLongTime = 10;
+  const double volume_bytes = static_cast<double>(sizeof(float)) * kSize * kSize * kSize;
+  const auto volumes_for = [&](const auto& work) {
+    auto volume = volume_of(data().grid, noise(data().grid.size, 1, 0, 1000));
+    const test::PeakMemory memory;
+    work(*volume);
+    return 1 + static_cast<double>(memory.rise()) / volume_bytes;
+  };
+  Rounds rounds;
+  data().next = {};
+  for ([[maybe_unused]] auto round : state) {
+    rounds.add("explicit_volumes", volumes_for([&](Volume& volume) {
+                 smooth(volume, MeanCurvatureFlow{.flow_time_mm2 = kStep, .tolerance_voxels = 0});
+               }));
+    rounds.add("long_volumes",
+               volumes_for([&](Volume& volume) { smooth(volume, MeanCurvatureFlow{kLongTime}); }));
+    rounds.add("heat_volumes", volumes_for([&](Volume& volume) { smooth(volume, Laplacian{kLongTime}); }));
+  }
+  rounds.report(state);
+}
+
+BENCHMARK(flow_memory)->Iterations(1);
 
 }  // namespace
 }  // namespace volsmooth

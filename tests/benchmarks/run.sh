@@ -55,13 +55,23 @@ MCF step, scheme of the thesis / ITK CurvatureFlow, 1 thread|of("flow_steps/thre
 MCF step, scheme of the thesis / ITK CurvatureFlow, 2 threads|of("flow_steps/threads:2"; "itk_over_mcf")|1/35|1/60
 MCF step, default scheme / ITK CurvatureFlow, 1 thread|of("flow_steps/threads:1"; "itk_over_face_centred")|1/35|1/60
 MCF step, default scheme / ITK CurvatureFlow, 2 threads|of("flow_steps/threads:2"; "itk_over_face_centred")|1/35|1/60
-MCF to T = 1 h^2, at a smaller error / ITK CurvatureFlow|of("time_to_result/flow_time:1/"; "itk_over_flow")|1/40|1/80
-MCF to T = 10 h^2, at a smaller error / ITK CurvatureFlow|of("time_to_result/flow_time:10/"; "itk_over_flow")|1/100|1/200
-MCF to T = 100 h^2, at a smaller error / ITK CurvatureFlow|of("time_to_result/flow_time:100/"; "itk_over_flow")|1/300|1/1000
+MCF to T = 1 h^2 / ITK CurvatureFlow|of("time_to_result/flow_time:1/"; "itk_over_flow")|1/40|1/80
+MCF to T = 10 h^2 / ITK CurvatureFlow|of("time_to_result/flow_time:10/"; "itk_over_flow")|1/100|1/200
+MCF to T = 100 h^2 / ITK CurvatureFlow|of("time_to_result/flow_time:100/"; "itk_over_flow")|1/300|1/1000
+MCF to T = 1 h^2: error / that of ITK|of("time_to_result/flow_time:1/"; "error") / of("time_to_result/flow_time:1/"; "itk_error")|1.0|
+MCF to T = 10 h^2: error / that of ITK|of("time_to_result/flow_time:10/"; "error") / of("time_to_result/flow_time:10/"; "itk_error")|1.0|
+MCF to T = 100 h^2: error / that of ITK|of("time_to_result/flow_time:100/"; "error") / of("time_to_result/flow_time:100/"; "itk_error")|1.0|
+Laplacian to T = 10 h^2 / ITK SmoothingRecursiveGaussian|of("time_to_result/flow_time:10/"; "itk_gaussian_over_heat")|1/1|
+Laplacian step / ITK Laplacian, 2 threads|of("flow_steps/threads:2"; "itk_over_laplacian")|1/1|
 MCF step, scheme of the thesis / streaming copy, 1 thread|of("flow_steps/threads:1"; "mcf_over_copy")|5|3
 MCF step, scheme of the thesis / streaming copy, 2 threads|of("flow_steps/threads:2"; "mcf_over_copy")|4|3
 Laplacian step / streaming copy, 1 thread|of("flow_steps/threads:1"; "laplacian_over_copy")|1.5|1.2
 Laplacian step / streaming copy, 2 threads|of("flow_steps/threads:2"; "laplacian_over_copy")|1.5|1.2
+offset step / streaming copy, 1 thread|of("flow_steps/threads:1"; "offset_over_copy")|2.0|1.5
+offset step / streaming copy, 2 threads|of("flow_steps/threads:2"; "offset_over_copy")|2.0|1.5
+peak memory of explicit steps / volume in float|of("flow_memory"; "explicit_volumes")|2.2|1.2
+peak memory of long steps / volume in float|of("flow_memory"; "long_volumes")||
+peak memory of the Laplacian / volume in float|of("flow_memory"; "heat_volumes")||
 MCF step, speed-up by the second thread|of("flow_steps/threads:1"; "mcf_seconds") / of("flow_steps/threads:2"; "mcf_seconds")|1.85|1.95
 isosurface / VTK FlyingEdges3D, 1 thread|of("isosurface/threads:1"; "isosurface_over_vtk")|1.0|0.6
 isosurface / VTK FlyingEdges3D, 2 threads|of("isosurface/threads:2"; "isosurface_over_vtk")|1.0|0.6
