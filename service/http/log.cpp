@@ -42,13 +42,13 @@ void start_log(const std::string& level) {
 
 void log_request(const RequestRecord& request) {
   spdlog::info(
-      R"("event":"request","request":{},"method":"{}","route":"{}","status":{},"bytes_in":{},"bytes_out":{},"ms":{:.1f})",
+      R"("event":"request","request":"{}","method":"{}","route":"{}","status":{},"bytes_in":{},"bytes_out":{},"ms":{:.1f})",
       request.id, request.method, request.route, request.status, request.bytes_in, request.bytes_out,
       1000 * request.seconds);
 }
 
-void log_fault(std::uint64_t request_id, std::string_view route, std::string_view what) {
-  spdlog::error(R"("event":"fault","request":{},"route":"{}","what":{})", request_id, route, quoted(what));
+void log_fault(std::string_view request_id, std::string_view route, std::string_view what) {
+  spdlog::error(R"("event":"fault","request":"{}","route":"{}","what":{})", request_id, route, quoted(what));
 }
 
 void log_job(const Job& job) {

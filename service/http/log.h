@@ -10,7 +10,7 @@ namespace volsmooth {
 
 /// What the log says of a request. Nothing a client wrote gets in: the route is its pattern.
 struct RequestRecord {
-  std::uint64_t id = 0;
+  std::string id;  ///< unique, also across restarts
   std::string method;
   std::string_view route;  ///< empty: none matched
   int status = 0;          ///< 0: the client went away before an answer
@@ -23,7 +23,7 @@ struct RequestRecord {
 void start_log(const std::string& level);
 
 void log_request(const RequestRecord& request);
-void log_fault(std::uint64_t request_id, std::string_view route, std::string_view what);
+void log_fault(std::string_view request_id, std::string_view route, std::string_view what);
 void log_job(const Job& job);
 void log_event(std::string_view event, std::string_view message);
 

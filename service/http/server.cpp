@@ -168,7 +168,7 @@ struct Server::State {
     try {
       begin(std::move(socket));
     } catch (const std::exception& error) {
-      log_fault(0, "", error.what());
+      log_fault("", "", error.what());
     }
   }
 
@@ -192,7 +192,7 @@ struct Server::State {
     try {
       if (fault) std::rethrow_exception(fault);
     } catch (const std::exception& error) {
-      log_fault(0, "", error.what());
+      log_fault("", "", error.what());
     }
     if (context.stopping && sessions.empty()) all_ended.set_value();
   }

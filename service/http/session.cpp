@@ -31,7 +31,7 @@ Session::Session(Socket socket, SessionContext& context)
 
 Problem Session::fault(const Exchange& exchange, const std::exception& error) {
   const auto id = exchange.record.id;
-  log_fault(id, exchange.route->pattern, error.what());
+  log_fault(id, exchange.route ? exchange.route->pattern : "", error.what());
   // By contract, the store's failures are the only runtime errors down there.
   if (dynamic_cast<const std::runtime_error*>(&error))
     return {"store-unavailable", "The store failed; try again later.", {{"request", id}}};
@@ -55,7 +55,8 @@ Session::Awaitable<bool> Session::serve_one() {
   if (!begun) co_return false;
 
   Exchange exchange;
-  exchange.record.id = ++context_.last_request;
+  exchange.record.id =
+      std::to_string(context_.api.jobs.start_number()) + "-" + std::to_string(++context_.last_request);
   const auto start = std::chrono::steady_clock::now();
   co_await serve(exchange);
   if (exchange.request.file) co_await context_.bulk.run([&] { exchange.request.file.reset(); });
@@ -127,6 +128,11 @@ tl::expected<void, Problem> Session::admit(Exchange& exchange) const {
   return {};
 }
 
+Actor Session::actor_of(const Exchange& exchange) {
+  const Caller& caller = exchange.request.caller;
+  return {caller.tenant, caller.token, exchange.record.id};
+}
+
 Session::Awaitable<void> Session::handle(Exchange& exchange, std::unique_ptr<BodyReceiver> receiver) {
   Request& request = exchange.request;
   const auto counted = request.file ? context_.api.metrics.upload_begins() : nullptr;
@@ -141,11 +147,15 @@ Session::Awaitable<void> Session::handle(Exchange& exchange, std::unique_ptr<Bod
     co_await send(exchange, tl::unexpected(complete.error()));
     co_return;
   }
+  const bool gives_files = exchange.route->answer.media_type == "*/*";  // which are opened and checked first
   ThreadPool& pool = request.file                      ? context_.verifying
+                     : gives_files                     ? context_.bulk
                      : exchange.route->method == "GET" ? context_.reading
                                                        : context_.writing;
-  auto reply =
-      co_await run_guarded(pool, exchange, [&] { return exchange.route->handle(context_.api, request); });
+  auto reply = co_await run_guarded(pool, exchange, [&] {
+    const ActingFor caller(actor_of(exchange));
+    return exchange.route->handle(context_.api, request);
+  });
   co_await send(exchange, std::move(reply));
 }
 

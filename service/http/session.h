@@ -72,7 +72,9 @@ class Session {
 
   tl::expected<void, Problem> admit(Exchange& exchange) const;
 
+  static Actor actor_of(const Exchange& exchange);
   Awaitable<void> send(Exchange& exchange, Reply reply);
+  Awaitable<Reply> audited(Exchange& exchange, Reply reply);
   Awaitable<bool> send_file(Exchange& exchange, const FileBody& body);
   Awaitable<bool> send_events(Exchange& exchange, EventStream& stream);
   Awaitable<Reply> wait_for(Exchange& exchange, LongPoll& poll, Response head);

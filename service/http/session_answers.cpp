@@ -1,6 +1,7 @@
 #include <chrono>
 #include <span>
 
+#include "service/http/audit_entry.h"
 #include "service/http/entity_tag.h"
 #include "service/http/problem_types.h"
 #include "service/http/session.h"
@@ -59,6 +60,7 @@ Session::Awaitable<void> Session::send(Exchange& exchange, Reply reply) {
     LongPoll poll = std::move(std::get<LongPoll>(reply->body));
     reply = co_await wait_for(exchange, poll, std::move(*reply));
   }
+  reply = co_await audited(exchange, std::move(reply));
   Response response = reply ? std::move(*reply) : response_to(reply.error());
   const Head& head = exchange.request.head;
   const auto stream = std::get_if<EventStream>(&response.body);
@@ -67,6 +69,7 @@ Session::Awaitable<void> Session::send(Exchange& exchange, Reply reply) {
   auto fields = std::move(response.headers);
   std::visit([&](const auto& body) { describe(body, response.status, fields); }, response.body);
   fields.push_back({"X-Content-Type-Options", "nosniff"});
+  fields.push_back({"X-Request-Id", exchange.record.id});
   if (stream && !head.http_1_0) fields.push_back({"Transfer-Encoding", "chunked"});
   if (!exchange.keep_alive) fields.push_back({"Connection", "close"});
 
@@ -80,6 +83,20 @@ Session::Awaitable<void> Session::send(Exchange& exchange, Reply reply) {
   if (sent && with_body && file) sent = co_await send_file(exchange, *file);
   if (sent && with_body && stream) sent = co_await send_events(exchange, *stream);
   if (!sent) exchange.keep_alive = false;
+}
+
+/// Audits what leaves no row of its own: bytes of files that go out, and what was refused. Bytes that cannot
+/// be audited stay here; a refusal stands.
+Session::Awaitable<Reply> Session::audited(Exchange& exchange, Reply reply) {
+  const auto entry = audit_entry(exchange.route, exchange.request, reply);
+  if (!entry) co_return reply;
+  const auto recorded = co_await run_guarded(context_.bulk, exchange, [&]() -> tl::expected<void, Problem> {
+    const ActingFor caller(actor_of(exchange));
+    context_.api.jobs.audit_done(*entry);
+    return {};
+  });
+  if (!recorded && reply) reply = tl::unexpected(recorded.error());
+  co_return reply;
 }
 
 Session::Awaitable<bool> Session::send_file(Exchange& exchange, const FileBody& body) {

@@ -289,6 +289,14 @@ void JobService::on_store_lost(std::function<void()> observer) {
   state_->database.on_condemned(std::move(observer));
 }
 
+void JobService::audit_done(AuditEntry entry) {
+  state_->audit_queue.record(std::move(entry));
+}
+
+std::int64_t JobService::start_number() const {
+  return state_->database.start_number();
+}
+
 void JobService::forget_expired() {
   state_->expiry.forget_expired();
 }

@@ -11,6 +11,7 @@
 #include <tl/expected.hpp>
 #include <vector>
 
+#include "service/jobs/audit_log.h"
 #include "service/jobs/caller.h"
 #include "service/jobs/job.h"
 #include "service/jobs/pacs.h"
@@ -155,10 +156,15 @@ class JobService {
   /// the process is to end, and the next start recovers. Set before `start`.
   void on_store_lost(std::function<void()> observer);
 
+  /// Audits what an actor (ActingFor) did that changes nothing here, such as a download; durable when it
+  /// returns.
+  void audit_done(AuditEntry entry);
+
   /// Removes what has been kept long enough; once started, it happens by itself within a second or two.
   void forget_expired();
 
   ServiceStatistics statistics();
+  std::int64_t start_number() const;               ///< of this start of the daemon: 1, 2, ...
   std::optional<std::string> not_ready_because();  ///< none: ready
 
  private:

@@ -42,6 +42,7 @@ JobService::State::State(JobServiceSettings given, Engine computing, Pacs networ
       pacs(std::move(network)),
       files(settings.data_dir, settings.reserved_disk_bytes),
       database(files.path_of("volsmooth.db"), settings.clock),
+      audit_queue(database),
       stored_files(database, files),
       volumes(database),
       jobs(database),

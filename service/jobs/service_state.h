@@ -7,6 +7,7 @@
 #include <string>
 
 #include "service/jobs/arrival_store.h"
+#include "service/jobs/audit_queue.h"
 #include "service/jobs/claimed_job.h"
 #include "service/jobs/delivery_runner.h"
 #include "service/jobs/expiry.h"
@@ -75,6 +76,7 @@ struct JobService::State {
   const Pacs pacs;
   FileStore files;
   StoreDatabase database;
+  AuditQueue audit_queue;
   StoredFiles stored_files;
   VolumeStore volumes;
   JobStore jobs;

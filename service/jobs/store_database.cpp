@@ -1,5 +1,8 @@
 #include "service/jobs/store_database.h"
 
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
 #include <array>
 #include <stdexcept>
 #include <string>
@@ -180,9 +183,20 @@ constexpr const char* kKeeping = R"(
   CREATE INDEX request_keys_by_age ON request_keys (at_ms);
 )";
 
+/// Who did it, how it went, and a chain that no row can leave unnoticed.
+constexpr const char* kAudit = R"(
+  ALTER TABLE audit ADD COLUMN tenant TEXT NOT NULL DEFAULT '';
+  ALTER TABLE audit ADD COLUMN token TEXT NOT NULL DEFAULT '';
+  ALTER TABLE audit ADD COLUMN request TEXT NOT NULL DEFAULT '';
+  ALTER TABLE audit ADD COLUMN outcome TEXT NOT NULL DEFAULT 'done';
+  ALTER TABLE audit ADD COLUMN hash TEXT NOT NULL DEFAULT '';
+)";
+
 /// What makes each version of the schema of the one before.
-constexpr std::array kVersions = {kFirstSchema, kIndexByState, kNodes,  kLongJobs,
-                                  kTenants,     kStoredFiles,  kKeeping};
+constexpr std::array kVersions = {kFirstSchema, kIndexByState, kNodes,   kLongJobs,
+                                  kTenants,     kStoredFiles,  kKeeping, kAudit};
+/// The last version in which the audit was no chain yet.
+constexpr std::size_t kUnlinkedAudit = std::ranges::find(kVersions, kAudit) - kVersions.begin();
 constexpr std::size_t kNewestVersion = kVersions.size();
 
 std::size_t schema_version(Database& database) {
@@ -197,14 +211,25 @@ void check_integrity(Database& database) {
     throw std::runtime_error("the database is damaged; restore the data directory from a backup");
 }
 
+/// What the last daemon sealed must be there. If not, that is audited: the next seal would hide it.
+void check_audit(Database& database, const AuditHead& sealed) {
+  if (sealed.sequence == 0 || audit_holds(database, sealed)) return;
+  spdlog::critical("the audit was shortened or changed while no daemon ran: row {} is not what was sealed",
+                   sealed.sequence);
+  audit(database, {std::string(kAuditBroken), "audit",
+                   "sealed was row " + std::to_string(sealed.sequence) + " with hash " + sealed.hash});
+}
+
 /// Creates what is missing and counts the start, all in one transaction.
-std::int64_t prepare(Database& database) {
+std::int64_t prepare(Database& database, const AuditHead& sealed) {
   check_integrity(database);
   Transaction transaction(database, Transaction::Kind::kWrite);
   const std::size_t version = schema_version(database);
   if (version > kNewestVersion)
     throw std::runtime_error("the database was written by a later version of volsmoothd");
   for (std::size_t next = version; next < kNewestVersion; ++next) database.execute(kVersions[next]);
+  if (version <= kUnlinkedAudit) link_audit(database);
+  check_audit(database, sealed);
   database.execute(("PRAGMA user_version = " + std::to_string(kNewestVersion)).c_str());
   database.run("INSERT INTO starts (at_ms) VALUES (?)", milliseconds_of(now_in_milliseconds()));
   Statement newest = database.query("SELECT max(number) FROM starts");
@@ -219,21 +244,19 @@ std::int64_t prepare(Database& database) {
 StoreDatabase::StoreDatabase(const std::filesystem::path& file, std::function<Time()> clock)
     : clock_(std::move(clock)),
       writer_(file, Database::Access::kWriter),
-      start_number_(prepare(writer_)),
+      seal_(file),
+      start_number_(prepare(writer_, seal_.last())),
       reader_(file, Database::Access::kReader) {}
 
 void StoreDatabase::commit(Transaction& transaction) {
+  const AuditHead head = audit_head(writer_);
   try {
     transaction.commit();
   } catch (const DatabaseError&) {
     if (condemned()) on_condemned_();
     throw;
   }
-}
-
-void audit(Database& database, std::string_view subject, std::string_view action) {
-  database.run("INSERT INTO audit (at_ms, subject, action) VALUES (?, ?, ?)",
-               milliseconds_of(now_in_milliseconds()), subject, action);
+  if (head != seal_.last()) seal_.write(head);
 }
 
 void StoreDatabase::forget_tombstones(Time before) {

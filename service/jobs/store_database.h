@@ -9,6 +9,8 @@
 #include <string_view>
 #include <utility>
 
+#include "service/jobs/audit_log.h"
+#include "service/jobs/audit_seal.h"
 #include "service/jobs/job.h"
 #include "service/storage/database.h"
 
@@ -71,6 +73,7 @@ class StoreDatabase {
   std::mutex writer_mutex_, reader_mutex_;      // where both are needed, in this order
   std::atomic<bool> log_holds_deleted_ = true;  // what the last daemon did is not known
   Database writer_;                             // before the reader, which must be closed first
+  AuditSeal seal_;                              // written under the writer's mutex
   std::int64_t start_number_;
   Database reader_;
   std::function<void()> on_condemned_ = [] {};
@@ -78,7 +81,6 @@ class StoreDatabase {
 
 // The pieces that volumes and jobs share. Those that write belong into the caller's transaction.
 
-void audit(Database& database, std::string_view subject, std::string_view action);
 /// Why there is nothing of an id any more.
 enum class Burial { kDeleted, kExpired };
 /// Leaves a tombstone.

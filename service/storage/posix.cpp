@@ -53,6 +53,18 @@ std::size_t read_at(const FileDescriptor& file, std::int64_t offset, std::span<s
   return filled;
 }
 
+void write_at(const FileDescriptor& file, std::int64_t offset, std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t put = ::pwrite(file.get(), bytes.data(), bytes.size(), offset);
+    if (put >= 0) {
+      bytes = bytes.subspan(static_cast<std::size_t>(put));
+      offset += put;
+    } else if (errno != EINTR) {
+      throw_errno("write");
+    }
+  }
+}
+
 void write_all(const FileDescriptor& file, std::span<const std::byte> bytes) {
   while (!bytes.empty()) {
     const ssize_t put = ::write(file.get(), bytes.data(), bytes.size());

@@ -32,6 +32,7 @@ FileDescriptor open_file(const std::filesystem::path& path, int flags);
 std::size_t read_some(const FileDescriptor& file, std::span<std::byte> into);  ///< 0: at the end
 /// Fills `into` from `offset` on; fewer bytes when the file ends before.
 std::size_t read_at(const FileDescriptor& file, std::int64_t offset, std::span<std::byte> into);
+void write_at(const FileDescriptor& file, std::int64_t offset, std::span<const std::byte> bytes);
 void write_all(const FileDescriptor& file, std::span<const std::byte> bytes);
 void sync_to_disk(const FileDescriptor& file);
 

@@ -14,8 +14,8 @@ TEST(Log, EveryLineIsAJsonObjectThatSaysWhenHowGraveAndWhat) {
   testing::internal::CaptureStderr();
   const auto before = spdlog::default_logger();
   start_log("debug");
-  log_request({7, "GET", "/v1/jobs/{id}", 200, 0, 12, 0.5});
-  log_fault(7, "/v1/jobs", "no \"such\" thing\n\xFF");
+  log_request({"7", "GET", "/v1/jobs/{id}", 200, 0, 12, 0.5});
+  log_fault("7", "/v1/jobs", "no \"such\" thing\n\xFF");
   log_job(Job());
   log_event("ready", "listening");
   const std::vector<std::string> plain = {"job j-1 attempt 2: it said \"no\"", "two\nlines\t\\", "", "\xFF"};

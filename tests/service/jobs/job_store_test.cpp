@@ -268,6 +268,8 @@ TEST(StoreDatabase, TakesOverWhatAnEarlierVersionWrote) {
   {
     StoreDatabase(file).write([](Database& database) {
       database.execute(
+          "INSERT INTO audit (at_ms, subject, action) VALUES (1, 'j-1', 'job deleted'), (2, 'v-1', 'volume "
+          "stored'); "
           "INSERT INTO tombstones (id, deleted_ms) VALUES ('j-1', 0); "
           "INSERT INTO volumes (id, options, facts, bytes, sha256, created_ms) VALUES ('v-1', '{}', '{}', 5, "
           "'aa', 0); "
@@ -286,6 +288,9 @@ TEST(StoreDatabase, TakesOverWhatAnEarlierVersionWrote) {
         "TABLE arrivals; "
         "ALTER TABLE jobs DROP COLUMN not_before_ms; ALTER TABLE jobs DROP COLUMN source_tries; "
         "ALTER TABLE jobs DROP COLUMN is_long; DROP TABLE stored_files; "
+        "ALTER TABLE audit DROP COLUMN hash; ALTER TABLE audit DROP COLUMN outcome; ALTER TABLE audit DROP "
+        "COLUMN "
+        "request; ALTER TABLE audit DROP COLUMN token; ALTER TABLE audit DROP COLUMN tenant; "
         "DROP TABLE request_keys; DROP INDEX expiring_volumes; DROP INDEX expiring_jobs; DROP INDEX "
         "jobs_of_volumes; DROP INDEX tombstones_by_age; ALTER TABLE volumes DROP COLUMN expires_ms; ALTER "
         "TABLE "
@@ -296,6 +301,7 @@ TEST(StoreDatabase, TakesOverWhatAnEarlierVersionWrote) {
         "ALTER TABLE jobs DROP COLUMN tenant; ALTER TABLE tombstones DROP COLUMN tenant; "
         "PRAGMA user_version = 1;");
   }
+  std::filesystem::remove(scratch / "test.db.audit");
   StoreDatabase now(file);
   EXPECT_EQ(now.start_number(), 2);
   EXPECT_TRUE(now.read(
@@ -305,6 +311,8 @@ TEST(StoreDatabase, TakesOverWhatAnEarlierVersionWrote) {
                   [](const Statement& row) { return row.text(0) + " " + row.text(1) + " " + row.text(2); });
   }),
             (std::vector<std::string>{"volumes/v-1 5 aa", "results/j-2.3/report.json 7 bb"}));
+  EXPECT_FALSE(now.read([](Database& database) { return fault_in_audit(database, {}); }));
+  EXPECT_EQ(now.read(audit_head).sequence, 2);
   EXPECT_TRUE(now.read([](Database& database) {
     return database.query("SELECT 1 FROM sqlite_schema WHERE name = 'jobs_by_state'").step();
   }));
