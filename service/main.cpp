@@ -9,10 +9,12 @@
 #include <atomic>
 #include <chrono>
 #include <filesystem>
+#include <functional>
 #include <iostream>
 #include <optional>
 #include <stdexcept>
 
+#include "service/audit_commands.h"
 #include "service/configuration.h"
 #include "service/http/log.h"
 #include "service/http/metrics.h"
@@ -194,10 +196,21 @@ void serve(const Options& options) {
     throw std::runtime_error("nobody knows whether a commit stands; the next start finds out and recovers");
 }
 
+/// The exit code of what is done instead of serving.
+int guarded(const std::function<int()>& command) {
+  try {
+    return command();
+  } catch (const std::exception& error) {
+    std::cerr << "volsmoothd: " << error.what() << '\n';
+    return 1;
+  }
+}
+
 int run(int argc, char** argv) {
   Options options;
   CLI::App app("Smooths medical volumes; an HTTP service. GET /openapi.json describes it.", "volsmoothd");
   declare(app, options);
+  const AuditCommands audit(app);
   const auto configuration = std::make_shared<JsonConfiguration>();
   app.config_formatter(configuration);
   try {
@@ -210,6 +223,7 @@ int run(int argc, char** argv) {
     std::cerr << "volsmoothd: " << error.what() << '\n';
     return kUsageError;
   }
+  if (audit.asked()) return guarded([&] { return audit.run(options.jobs.data_dir); });
   options.server.max_upload_bytes = options.jobs.max_upload_bytes;
   // The memory is said once, for the single job as for all that run together.
   options.jobs.keep = std::chrono::days(options.keep_days);
