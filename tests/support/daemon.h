@@ -14,9 +14,11 @@ namespace volsmooth::test {
 /// The real volsmoothd on a free port of the loopback, with a data directory that outlives restarts.
 class Daemon {
  public:
-  /// `program`: the path of volsmoothd. `options`: more of its options.
-  explicit Daemon(std::string program, std::vector<std::string> options = {})
-      : program_(std::move(program)), options_(std::move(options)) {
+  /// `program`: the path of volsmoothd. `options`: more of its options. `data`: its data directory, when that
+  /// is to be a certain one.
+  explicit Daemon(std::string program, std::vector<std::string> options = {}, std::filesystem::path data = {})
+      : program_(std::move(program)), options_(std::move(options)), data_(std::move(data)) {
+    if (data_.empty()) data_ = directory_ / "data";
     start();
   }
 
@@ -40,12 +42,13 @@ class Daemon {
 
   void kill() { process_->kill_and_wait(SIGKILL); }
   int terminate() { return process_->kill_and_wait(SIGTERM); }  ///< its exit code
+  int wait() { return process_->wait(); }                       ///< for its end; the exit code
   bool running() { return process_->running(); }
 
   pid_t pid() const { return process_->pid(); }
   int port() const { return port_; }
   std::string url() const { return "http://127.0.0.1:" + std::to_string(port_); }
-  std::filesystem::path data() const { return directory_ / "data"; }
+  const std::filesystem::path& data() const { return data_; }
 
   /// All that it has logged so far, over all starts.
   std::string log() const {
@@ -72,6 +75,7 @@ class Daemon {
   std::string program_;
   std::vector<std::string> options_;
   TemporaryDirectory directory_;
+  std::filesystem::path data_;
   std::vector<std::filesystem::path> logs_;
   std::optional<ChildProcess> process_;
   int starts_ = 0;

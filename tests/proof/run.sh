@@ -1,0 +1,27 @@
+#!/usr/bin/env bash
+# Usage: tests/proof/run.sh [kills|faults|power [N]]. Sets up a fresh Debian 12, builds, and runs the long
+# form of all proofs that the daemon keeps what it acknowledged, or of the one that is named:
+#   kills [N]   kill -9, N (500) times over 10 N small jobs
+#   faults [N]  an error at every N-th (1) call on the data directory
+#   power [N]   N (50) power cuts over 10 N small jobs; needs the right to mount
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+source client/setup.sh
+install_packages docker/build-packages.txt tests/packages.txt
+build build -DVOLSMOOTH_TESTS=ON -- proof_kills proof_faults proof_power
+
+shim=$PWD/build/tests/proof/libfault_shim.so
+prove() {
+  say "$1"
+  case $1 in
+    kills) build/bin/proof_kills "$shim" "${2:-500}" ;;
+    faults) build/bin/proof_faults "$shim" "${2:-1}" ;;
+    power) build/bin/proof_power "$shim" "${2:-50}" || (($? == 77)) ;;
+    *) die "there is no proof '$1'" ;;
+  esac
+}
+if (($#)); then
+  prove "$@"
+else
+  for name in kills faults power; do prove "$name"; done
+fi

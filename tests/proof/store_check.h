@@ -1,0 +1,81 @@
+#pragma once
+
+#include <openssl/sha.h>
+#include <sqlite3.h>
+
+#include <filesystem>
+#include <map>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "tests/support/child_process.h"
+
+namespace volsmooth::test {
+
+inline std::string sha256_hex(std::string_view bytes) {
+  unsigned char digest[SHA256_DIGEST_LENGTH];
+  SHA256(reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size(), digest);
+  std::string hex;
+  for (const unsigned char byte : digest) {
+    hex += "0123456789abcdef"[byte >> 4];
+    hex += "0123456789abcdef"[byte & 15];
+  }
+  return hex;
+}
+
+/// What is wrong between the rows and the files of a data directory that no daemon has open: a damaged
+/// database, files that nobody refers to, files that are missing or have other bytes than their row says.
+inline std::vector<std::string> faults_of_store(const std::filesystem::path& data) {
+  namespace fs = std::filesystem;
+  std::vector<std::string> faults;
+  sqlite3* database = nullptr;
+  if (sqlite3_open_v2((data / "volsmooth.db").c_str(), &database, SQLITE_OPEN_READONLY, nullptr) != SQLITE_OK)
+    throw std::runtime_error("cannot open the database");
+  const auto rows = [&](const char* sql, const auto& row) {
+    sqlite3_stmt* statement = nullptr;
+    if (sqlite3_prepare_v2(database, sql, -1, &statement, nullptr) != SQLITE_OK)
+      throw std::runtime_error(sqlite3_errmsg(database));
+    const auto text = [&](int column) {
+      const auto* bytes = reinterpret_cast<const char*>(sqlite3_column_text(statement, column));
+      return std::string(bytes == nullptr ? "" : bytes);
+    };
+    while (sqlite3_step(statement) == SQLITE_ROW) row(text);
+    sqlite3_finalize(statement);
+  };
+  rows("PRAGMA integrity_check", [&](const auto& text) {
+    if (text(0) != "ok") faults.push_back("database: " + text(0));
+  });
+  rows("PRAGMA foreign_key_check",
+       [&](const auto& text) { faults.push_back("database: a row of " + text(0) + " refers to nothing"); });
+
+  std::map<std::string, std::string> sums;  // by file
+  rows("SELECT 'volumes/' || id, sha256 FROM volumes", [&](const auto& text) { sums[text(0)] = text(1); });
+  rows(
+      "SELECT 'results/' || jobs.id || '.' || attempt || '/' || name, sha256 FROM results JOIN jobs ON job = "
+      "sequence",
+      [&](const auto& text) { sums[text(0)] = text(1); });
+  sqlite3_close(database);
+
+  std::set<std::string> found;
+  for (const std::string folder : {"tmp", "volumes", "results", "arrivals"})
+    for (const auto& entry : fs::recursive_directory_iterator(data / folder)) {
+      const std::string name = fs::relative(entry.path(), data);
+      if (entry.is_directory()) {
+        if (fs::is_empty(entry.path())) faults.push_back(name + " is an empty directory");
+        continue;
+      }
+      found.insert(name);
+      const auto expected = sums.find(name);
+      if (expected == sums.end())
+        faults.push_back("nobody refers to " + name);
+      else if (sha256_hex(content_of(entry.path())) != expected->second)
+        faults.push_back(name + " has other bytes than its row says");
+    }
+  for (const auto& [name, sum] : sums)
+    if (!found.contains(name)) faults.push_back(name + " is not there");
+  return faults;
+}
+
+}  // namespace volsmooth::test
