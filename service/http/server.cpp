@@ -30,6 +30,7 @@ constexpr std::string_view kUnixPrefix = "unix:";
 constexpr int kReadingThreads = 4;
 constexpr int kWritingThreads = 2;  // one at a time gets at the store; the other prepares what comes next
 constexpr int kBulkThreads = 4;
+constexpr int kAuditingThreads = 32;
 constexpr int kVerifyingThreads = 2;
 constexpr auto kGrace = std::chrono::seconds(5);
 constexpr auto kPauseAfterAcceptFailure = std::chrono::milliseconds(100);
@@ -115,7 +116,8 @@ std::string too_many_connections() {
 struct Server::State {
   State(ServerSettings given, Api api)
       : settings(std::move(given)), context{settings, api,     {},   body_rules(settings, api),
-                                            reading,  writing, bulk, verifying} {
+                                            reading,  writing, bulk, auditing,
+                                            verifying} {
     for (const auto& name : settings.host_names) context.hosts.names.push_back(lowered(name));
     listen();
     thread = std::jthread([this] { io.run(); });
@@ -225,6 +227,7 @@ struct Server::State {
   ThreadPool reading{kReadingThreads, ThreadPool::Priority::kNormal};
   ThreadPool writing{kWritingThreads, ThreadPool::Priority::kNormal};
   ThreadPool bulk{kBulkThreads, ThreadPool::Priority::kNormal};
+  ThreadPool auditing{kAuditingThreads, ThreadPool::Priority::kNormal};
   ThreadPool verifying{kVerifyingThreads, ThreadPool::Priority::kLow};
   std::jthread thread;
 };

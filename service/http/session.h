@@ -24,6 +24,7 @@ struct SessionContext {
   ThreadPool& reading;  ///< for looks at the store: milliseconds
   ThreadPool& writing;  ///< for steps of the store, each with its fsync: nobody who only looks waits for them
   ThreadPool& bulk;     ///< for the bytes of files: as slow as the disk
+  ThreadPool& auditing;   ///< for rows of the audit; many, since those that wait together share an fsync
   ThreadPool& verifying;  ///< for handlers that were given a file: seconds
   std::uint64_t last_request = 0;
   bool stopping = false;

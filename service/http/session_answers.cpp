@@ -90,11 +90,12 @@ Session::Awaitable<void> Session::send(Exchange& exchange, Reply reply) {
 Session::Awaitable<Reply> Session::audited(Exchange& exchange, Reply reply) {
   const auto entry = audit_entry(exchange.route, exchange.request, reply);
   if (!entry) co_return reply;
-  const auto recorded = co_await run_guarded(context_.bulk, exchange, [&]() -> tl::expected<void, Problem> {
-    const ActingFor caller(actor_of(exchange));
-    context_.api.jobs.audit_done(*entry);
-    return {};
-  });
+  const auto recorded =
+      co_await run_guarded(context_.auditing, exchange, [&]() -> tl::expected<void, Problem> {
+        const ActingFor caller(actor_of(exchange));
+        context_.api.jobs.audit_done(*entry);
+        return {};
+      });
   if (!recorded && reply) reply = tl::unexpected(recorded.error());
   co_return reply;
 }

@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "service/jobs/stored_files.h"
 #include "service/storage/digest.h"
 
 namespace volsmooth {
@@ -66,9 +67,12 @@ tl::expected<std::vector<Result>, Problem> JobRunner::compute(ClaimedJob& claim)
   const auto volume = VolumeStore(database_).find(job.tenant, job.order.volume);
   if (!volume) throw Cancelled();
   const fs::path file = files_.path_of(volume_file(volume->id));
-  if (!fs::exists(file) || digest_of(file, [&] { running.throw_if_interrupted(); }).sha256 != volume->sha256)
+  if (!fs::exists(file) ||
+      digest_of(file, [&] { running.throw_if_interrupted(); }).sha256 != volume->sha256) {
+    StoredFiles(database_, files_).check(volume_file(volume->id));  // records it: nobody is to get it
     return tl::unexpected(Problem{"integrity-failure",
                                   "The stored volume is not what was uploaded any more; upload it again."});
+  }
 
   const fs::path output_dir = files_.begin_directory(results_directory(job));
   auto results = engine_.compute({file, *volume, job.order, job.parameters, output_dir, threads_}, report);

@@ -93,6 +93,8 @@ TEST_F(JobServiceTest, AVolumeThatChangedOnTheDiskIsNotComputed) {
   ASSERT_EQ(job.state, JobState::kFailed);
   EXPECT_EQ(job.error->slug, "integrity-failure");
   EXPECT_EQ(fake_.computed, 0);
+  EXPECT_EQ(service_->statistics().damaged_files, 1);
+  EXPECT_EQ(slug_of(service_->volume_content(kAnyone, volume.id)), "integrity-failure");
 }
 
 TEST_F(JobServiceTest, AResultOfAnotherSizeIsNotGivenOut) {
