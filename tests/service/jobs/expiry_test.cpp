@@ -170,5 +170,18 @@ TEST_F(ExpiryTest, WhatGoesLeavesNothingInTheDataDirectory) {
   EXPECT_FALSE(holding(volume).empty());  // its tombstone; the search finds what is there
 }
 
+/// Without a volume that goes at the same time.
+TEST_F(ExpiryTest, AJobThatIsDeletedLeavesNothing) {
+  open_with(days(0));
+  const std::string volume = upload(*service_, "voxels").value().id;
+  service_->forget_expired();
+  const std::string job = service_->submit(kAnyone, order_for(volume, "Planted Patient")).value().id;
+  wait_for(*service_, job);
+  EXPECT_FALSE(holding("Planted Patient").empty());
+  ASSERT_TRUE(service_->delete_job(kAnyone, job));
+  service_->forget_expired();
+  EXPECT_THAT(holding("Planted Patient"), testing::IsEmpty());
+}
+
 }  // namespace
 }  // namespace volsmooth
