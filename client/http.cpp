@@ -71,6 +71,13 @@ Failure broken(CURLcode code, const ServerAddress& server) {
               {}};
     case CURLE_OPERATION_TIMEDOUT:
       return {ExitCode::kUnreachable, "The server at " + server.as_written + " did not answer in time.", {}};
+    case CURLE_PEER_FAILED_VERIFICATION:
+      return {ExitCode::kUnreachable,
+              "The certificate of the server at " + server.as_written +
+                  " is not trusted, or is of another name; --ca-file names whom to trust.",
+              {}};
+    case CURLE_SSL_CACERT_BADFILE:
+      return {ExitCode::kNoInput, "No certificates can be read from " + server.ca_file + ".", {}};
     default:
       return {ExitCode::kUnreachable,
               "The connection to " + server.as_written + " broke: " + curl_easy_strerror(code) + ".",
@@ -119,6 +126,7 @@ struct HttpClient::Handles {
     if (!server.socket_path.empty())
       curl_easy_setopt(easy, CURLOPT_UNIX_SOCKET_PATH, server.socket_path.c_str());
     if (server.is_local()) curl_easy_setopt(easy, CURLOPT_PROXY, "");
+    if (!server.ca_file.empty()) curl_easy_setopt(easy, CURLOPT_CAINFO, server.ca_file.c_str());
     curl_easy_setopt(easy, CURLOPT_PROTOCOLS_STR, "http,https");
     curl_easy_setopt(easy, CURLOPT_PATH_AS_IS, 1L);
     curl_easy_setopt(easy, CURLOPT_NOSIGNAL, 1L);

@@ -59,8 +59,9 @@ Expected<void> run(const Options& options, const Console& console) {
     if (const auto checked = check_stems(options.inputs); !checked) return checked;
     if (options.server.empty()) return run_privately(options, console, interruption);
   }
-  const auto server = parse_server(options.server.empty() ? kDefaultServer : options.server);
+  auto server = parse_server(options.server.empty() ? kDefaultServer : options.server);
   if (!server) return tl::unexpected(server.error());
+  server->ca_file = options.ca_file;
   return run_on(*server, false, options, console, interruption);
 }
 

@@ -51,6 +51,10 @@ void add_common_options(CLI::App& app, Options& options) {
       ->envname("VOLSMOOTH_SERVER");
   app.add_option("--token-file", options.token_file,
                  "File with the access token (or the token in VOLSMOOTH_TOKEN)");
+  app.add_option("--ca-file", options.ca_file,
+                 "Certificates (PEM) that an https server is trusted by, in place of the system's (or "
+                 "VOLSMOOTH_CA_FILE)")
+      ->envname("VOLSMOOTH_CA_FILE");
   app.add_flag("--json", options.json, "Print the documents of the REST interface, one a line");
   app.add_flag("-q,--quiet", options.quiet, "No progress, no warnings");
   app.add_flag("-v,--verbose", options.verbose, "Tell each request, and what the private daemon logs");

@@ -30,7 +30,7 @@ struct Options {
   std::string command;
 
   std::string server;  ///< empty: none given
-  std::filesystem::path token_file;
+  std::filesystem::path token_file, ca_file;
   bool json = false, quiet = false, verbose = false;
 
   std::vector<std::filesystem::path> inputs;

@@ -11,9 +11,10 @@ inline constexpr std::string_view kDefaultServer = "http://127.0.0.1:8742";
 
 /// Where a daemon listens.
 struct ServerAddress {
-  std::string url;          ///< without a slash at the end; "http://localhost" for a Unix socket
-  std::string socket_path;  ///< empty: TCP
-  std::string as_written;   ///< for messages, without a password
+  std::string url;           ///< without a slash at the end; "http://localhost" for a Unix socket
+  std::string socket_path;   ///< empty: TCP
+  std::string as_written;    ///< for messages, without a password
+  std::string ca_file = {};  ///< whom to trust by TLS; empty: whom the system trusts
 
   bool is_local() const;  ///< never through a proxy
 };

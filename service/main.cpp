@@ -15,12 +15,15 @@
 #include <stdexcept>
 
 #include "service/audit_commands.h"
+#include "service/commands.h"
 #include "service/configuration.h"
+#include "service/control/control_socket.h"
 #include "service/http/log.h"
 #include "service/http/metrics.h"
 #include "service/http/server.h"
 #include "service/jobs/job_service.h"
 #include "service/jobs/machine.h"
+#include "service/jobs/tokens.h"
 #include "service/pacs/dimse_listener.h"
 #include "service/pacs/pacs.h"
 #include "service/pacs/presets.h"
@@ -40,6 +43,7 @@ struct Options {
   bool ephemeral = false;
   int keep_days = 7;
   int scrub_days = 7;
+  bool require_tokens = false;
   // Of the configuration file.
   std::vector<Node> nodes;
   std::vector<Preset> presets;
@@ -102,10 +106,16 @@ void declare(CLI::App& app, Options& options) {
   app.add_option("--host-name", options.server.host_names,
                  "A name by which clients address this daemon, beside localhost; repeatable")
       ->envname("VOLSMOOTH_HOST_NAME");
-  app.add_flag(
-         "--allow-open-network", options.server.allow_open_network,
-         "Allows to listen on addresses that others than this machine reach. There is no access control")
+  app.add_flag("--allow-open-network", options.server.allow_open_network,
+               "Allows to listen on addresses that others than this machine reach, without TLS or tokens")
       ->envname("VOLSMOOTH_ALLOW_OPEN_NETWORK");
+  app.add_option("--tls-cert", options.server.tls_certificate,
+                 "Certificate chain (PEM) to listen by TLS; read again on SIGHUP, as is the key")
+      ->envname("VOLSMOOTH_TLS_CERT");
+  app.add_option("--tls-key", options.server.tls_key, "Its private key (PEM)")->envname("VOLSMOOTH_TLS_KEY");
+  app.add_flag("--require-tokens", options.require_tokens,
+               "Callers need a token even before there is one (volsmoothd token create)")
+      ->envname("VOLSMOOTH_REQUIRE_TOKENS");
   app.add_flag("--ephemeral", options.ephemeral,
                "Removes the data folder at the end; it must be new or empty")
       ->envname("VOLSMOOTH_EPHEMERAL");
@@ -136,12 +146,23 @@ int connections_for(std::int64_t open_files) {
   return static_cast<int>(std::max<std::int64_t>((open_files - kOther) / 2, 1));
 }
 
-sigset_t end_signals() {
+/// Without TLS, SIGHUP ends the daemon like any program whose terminal goes.
+sigset_t awaited_signals(const Options& options) {
   sigset_t set;
   sigemptyset(&set);
   sigaddset(&set, SIGTERM);
   sigaddset(&set, SIGINT);
+  if (!options.server.tls_certificate.empty()) sigaddset(&set, SIGHUP);
   return set;
+}
+
+void reload_tls(Server& server) {
+  try {
+    server.reload_tls();
+    log_event("tls-reloaded", "new connections get the certificate that is there now");
+  } catch (const std::runtime_error& error) {
+    log_event("tls-not-reloaded", error.what());
+  }
 }
 
 /// Devices speak DIMSE with it; what comes is kept by the jobs.
@@ -159,6 +180,17 @@ void listen_for_devices(const Options& options, JobService& jobs, std::optional<
                                            presets_by_title(options.presets), log_event},
                    std::move(inbox));
   log_event("dimse-ready", "listening for DICOM associations on " + listener->address());
+}
+
+/// Some file systems, such as folders shared into a virtual machine, have no sockets; serving goes on
+/// without.
+void listen_for_commands(const Options& options, JobService& jobs, std::optional<ControlSocket>& control) {
+  try {
+    control.emplace(options.jobs.data_dir,
+                    [&jobs](const std::string& request) { return answer_command(jobs, request); });
+  } catch (const std::runtime_error& error) {
+    log_event("no-commands", error.what());
+  }
 }
 
 void serve(const Options& options) {
@@ -179,18 +211,22 @@ void serve(const Options& options) {
     store_lost = true;
     ::kill(::getpid(), SIGTERM);
   });
+  if (options.require_tokens) jobs.tokens().require();
   Server server(options.server, {jobs, metrics});
+  std::optional<ControlSocket> control;
+  listen_for_commands(options, jobs, control);
   std::optional<DimseListener> listener;
   listen_for_devices(options, jobs, listener);
   jobs.start();
   log_event("ready", "volsmoothd " VOLSMOOTH_VERSION " listening on " + server.address());
 
-  const sigset_t signals = end_signals();
+  const sigset_t signals = awaited_signals(options);
   int received = 0;
-  sigwait(&signals, &received);
+  while (sigwait(&signals, &received) == 0 && received == SIGHUP) reload_tls(server);
   log_event("stopping", received == SIGTERM ? "SIGTERM" : "SIGINT");
   jobs.stop();  // first: those whose uploads are being verified still get an answer
   listener.reset();
+  control.reset();
   server.stop();
   if (store_lost)
     throw std::runtime_error("nobody knows whether a commit stands; the next start finds out and recovers");
@@ -211,6 +247,7 @@ int run(int argc, char** argv) {
   CLI::App app("Smooths medical volumes; an HTTP service. GET /openapi.json describes it.", "volsmoothd");
   declare(app, options);
   const AuditCommands audit(app);
+  const Commands commands(app);
   const auto configuration = std::make_shared<JsonConfiguration>();
   app.config_formatter(configuration);
   try {
@@ -224,6 +261,7 @@ int run(int argc, char** argv) {
     return kUsageError;
   }
   if (audit.asked()) return guarded([&] { return audit.run(options.jobs.data_dir); });
+  if (commands.asked()) return guarded([&] { return commands.run(options.jobs.data_dir); });
   options.server.max_upload_bytes = options.jobs.max_upload_bytes;
   // The memory is said once, for the single job as for all that run together.
   options.jobs.keep = std::chrono::days(options.keep_days);
@@ -233,7 +271,7 @@ int run(int argc, char** argv) {
       std::min(options.server.max_connections, connections_for(raise_open_files()));
 
   // Before any thread is there: all inherit the mask, and only sigwait takes them.
-  const sigset_t signals = end_signals();
+  const sigset_t signals = awaited_signals(options);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   ::signal(SIGPIPE, SIG_IGN);
   start_log(options.log_level);

@@ -1,5 +1,6 @@
 #include "service/http/connection.h"
 
+#include <poll.h>
 #include <sys/socket.h>
 
 #include <algorithm>
@@ -16,6 +17,7 @@
 #include <sstream>
 
 #include "service/http/body_decoder.h"
+#include "service/http/problem_types.h"
 
 namespace volsmooth {
 namespace {
@@ -29,6 +31,8 @@ constexpr auto kAwait = asio::as_tuple(asio::use_awaitable);
 
 constexpr std::size_t kReadBytes = 65536;
 constexpr double kDiscardSeconds = 2;
+constexpr auto kCancelAgain = std::chrono::milliseconds(100);
+constexpr char kTlsHandshake = 0x16;  ///< the first byte of a TLS connection (RFC 8446, 5.1)
 
 /// A block is given up when it takes so many times longer than may pass without a byte of it: otherwise a
 /// byte now and then would hold a connection, and what it has reserved, for ever.
@@ -60,13 +64,7 @@ class Connection::Deadline {
   Deadline(Connection& connection, double seconds)
       : Deadline(connection, std::chrono::steady_clock::now() + in_seconds(seconds)) {}
   Deadline(Connection& connection, std::chrono::steady_clock::time_point end) : connection_(connection) {
-    connection.timer_.expires_at(end);
-    connection.timer_.async_wait([armed = std::weak_ptr(expired_), &connection](error_code cancelled) {
-      const auto expired = armed.lock();
-      if (cancelled || !expired) return;
-      *expired = true;
-      connection.cancel();
-    });
+    arm(connection, expired_, end);
   }
   ~Deadline() { connection_.timer_.cancel(); }
   Deadline(const Deadline&) = delete;
@@ -76,6 +74,19 @@ class Connection::Deadline {
   ReadFailure failure() const { return expired() ? ReadFailure::kTimeout : ReadFailure::kClosed; }
 
  private:
+  /// Again and again: a TLS operation is several of the socket, and the end of one may just be on its way.
+  static void arm(Connection& connection, std::weak_ptr<bool> armed,
+                  std::chrono::steady_clock::time_point end) {
+    connection.timer_.expires_at(end);
+    connection.timer_.async_wait([armed, &connection](error_code cancelled) {
+      const auto expired = armed.lock();
+      if (cancelled || !expired) return;
+      *expired = true;
+      connection.cancel();
+      arm(connection, armed, std::chrono::steady_clock::now() + kCancelAgain);
+    });
+  }
+
   Connection& connection_;
   std::shared_ptr<bool> expired_ = std::make_shared<bool>(false);
 };
@@ -100,18 +111,46 @@ struct Connection::Codec {
   BodyDecoder body{Head{}};
 };
 
-Connection::Connection(Socket socket)
-    : socket_(std::move(socket)), timer_(socket_.get_executor()), codec_(std::make_unique<Codec>()) {
+Connection::Connection(Socket socket, const TlsIdentity* identity)
+    : socket_(std::move(socket)),
+      tls_(identity ? std::make_unique<TlsStream>(socket_, *identity) : nullptr),
+      timer_(socket_.get_executor()),
+      codec_(std::make_unique<Codec>()) {
   codec_->received.reserve(kReadBytes);
 }
 
 Connection::~Connection() = default;
 
+asio::awaitable<TlsStream::Outcome> Connection::read_some(asio::mutable_buffer into) {
+  if (tls_) co_return co_await tls_->read_some(into);
+  co_return co_await socket_.async_read_some(into, kAwait);
+}
+
+asio::awaitable<TlsStream::Outcome> Connection::write_some(asio::const_buffer from) {
+  if (tls_) co_return co_await tls_->write_some(from);
+  co_return co_await socket_.async_write_some(from, kAwait);
+}
+
+asio::awaitable<bool> Connection::begin(double seconds) {
+  if (!tls_) co_return true;
+  const Deadline deadline(*this, seconds);
+  const auto [unreadable] = co_await socket_.async_wait(Socket::wait_read, kAwait);
+  char first = 0;
+  if (unreadable || ::recv(socket_.native_handle(), &first, 1, MSG_PEEK | MSG_DONTWAIT) != 1) co_return false;
+  if (first == kTlsHandshake) co_return !co_await tls_->handshake();
+  tls_.reset();
+  const std::string answer =
+      refusal({"bad-header", "This port speaks TLS: write https:// in place of http://."});
+  co_await write(answer, kDiscardSeconds);
+  co_await close_gently();
+  co_return false;
+}
+
 asio::awaitable<bool> Connection::wait_for_request(double seconds) {
   auto& received = codec_->received;
   if (received.size() > 0) co_return true;
   const Deadline deadline(*this, seconds);
-  const auto [error, count] = co_await socket_.async_read_some(received.prepare(kMaxHeadBytes + 1), kAwait);
+  const auto [error, count] = co_await read_some(received.prepare(kMaxHeadBytes + 1));
   received.commit(count);
   co_return !error;
 }
@@ -128,7 +167,7 @@ asio::awaitable<tl::expected<std::string_view, ReadFailure>> Connection::read_he
     }
     if (deadline.expired()) co_return tl::unexpected(ReadFailure::kTimeout);
     const auto wanted = kMaxHeadBytes + 1 - text.size();
-    const auto [error, count] = co_await socket_.async_read_some(received.prepare(wanted), kAwait);
+    const auto [error, count] = co_await read_some(received.prepare(wanted));
     if (error) co_return tl::unexpected(deadline.failure());
     received.commit(count);
   }
@@ -155,7 +194,7 @@ asio::awaitable<tl::expected<std::string_view, ReadFailure>> Connection::read_bo
     if (received.size() == 0) {
       if (whole.expired()) co_return tl::unexpected(ReadFailure::kTimeout);
       const Deadline deadline(*this, whole.of_next_step());
-      const auto [error, count] = co_await socket_.async_read_some(received.prepare(kReadBytes), kAwait);
+      const auto [error, count] = co_await read_some(received.prepare(kReadBytes));
       if (error) co_return tl::unexpected(deadline.failure());
       received.commit(count);
     }
@@ -172,7 +211,7 @@ asio::awaitable<bool> Connection::write(std::string_view bytes, double seconds_p
   while (!bytes.empty()) {
     if (whole.expired()) co_return false;
     const Deadline deadline(*this, whole.of_next_step());
-    const auto [error, count] = co_await socket_.async_write_some(asio::buffer(bytes), kAwait);
+    const auto [error, count] = co_await write_some(asio::buffer(bytes));
     if (error) co_return false;
     bytes.remove_prefix(count);
   }
@@ -181,8 +220,9 @@ asio::awaitable<bool> Connection::write(std::string_view bytes, double seconds_p
 
 asio::awaitable<void> Connection::close_gently() {
   error_code ignored;
-  socket_.shutdown(Socket::shutdown_send, ignored);
   const Deadline deadline(*this, kDiscardSeconds);
+  if (tls_) co_await tls_->shutdown();
+  socket_.shutdown(Socket::shutdown_send, ignored);
   std::vector<char> discarded(kReadBytes);
   for (error_code error; !error && !deadline.expired();)
     std::tie(error, std::ignore) = co_await socket_.async_read_some(asio::buffer(discarded), kAwait);
@@ -196,6 +236,10 @@ void Connection::on_readable(std::function<void()> notice) {
 }
 
 bool Connection::peer_has_closed() {
+  if (tls_) {  // what can be read may be its word that it closes
+    pollfd state{socket_.native_handle(), POLLRDHUP, 0};
+    return ::poll(&state, 1, 0) != 0;
+  }
   char byte = 0;
   const auto count = ::recv(socket_.native_handle(), &byte, 1, MSG_PEEK | MSG_DONTWAIT);
   return count == 0 || (count < 0 && errno != EAGAIN && errno != EINTR);
@@ -213,6 +257,16 @@ std::string response_head(int status, const std::vector<HeaderField>& fields) {
   std::ostringstream text;
   text << response.base();
   return text.str();
+}
+
+std::string refusal(const Problem& problem) {
+  const std::string document = problem_document(problem).dump();
+  const int status = problem_type(problem.slug).status;
+  std::vector<HeaderField> fields = {{"Content-Type", "application/problem+json"},
+                                     {"Content-Length", std::to_string(document.size())},
+                                     {"Connection", "close"}};
+  if (status == 503) fields.push_back({"Retry-After", "5"});
+  return response_head(status, fields) + document;
 }
 
 std::string as_chunk(std::string_view bytes) {

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
-#include <boost/asio/generic/stream_protocol.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <functional>
 #include <memory>
@@ -12,11 +11,9 @@
 #include <tl/expected.hpp>
 
 #include "service/http/head_check.h"
+#include "service/http/tls_stream.h"
 
 namespace volsmooth {
-
-/// TCP or Unix, all the same: one instantiation of Beast serves both.
-using Socket = boost::asio::generic::stream_protocol::socket;
 
 enum class ReadFailure { kClosed, kTimeout, kMalformed };
 
@@ -24,8 +21,13 @@ enum class ReadFailure { kClosed, kTimeout, kMalformed };
 /// framing, and what is written. Used from the I/O thread.
 class Connection {
  public:
-  explicit Connection(Socket socket);
+  /// With an identity it speaks TLS.
+  explicit Connection(Socket socket, const TlsIdentity* identity = nullptr);
   ~Connection();
+
+  /// Whether the peer can be spoken with: with TLS, by a handshake within `seconds`. Who speaks in the clear
+  /// is told so.
+  boost::asio::awaitable<bool> begin(double seconds);
 
   /// Whether the next request began within `seconds`.
   boost::asio::awaitable<bool> wait_for_request(double seconds);
@@ -58,13 +60,20 @@ class Connection {
   class Deadline;
   class BlockDeadline;
   struct Codec;
+  boost::asio::awaitable<TlsStream::Outcome> read_some(boost::asio::mutable_buffer into);
+  boost::asio::awaitable<TlsStream::Outcome> write_some(boost::asio::const_buffer from);
+
   Socket socket_;
+  std::unique_ptr<TlsStream> tls_;  ///< none: in the clear
   boost::asio::steady_timer timer_;
   std::unique_ptr<Codec> codec_;
 };
 
 /// The status line and the fields of a response, ending in an empty line.
 std::string response_head(int status, const std::vector<HeaderField>& fields);
+
+/// The last answer on a connection that is given up before a request of it was understood.
+std::string refusal(const Problem& problem);
 
 /// `bytes` as one chunk of a chunked body; no bytes: its end.
 std::string as_chunk(std::string_view bytes);

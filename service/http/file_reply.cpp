@@ -43,7 +43,7 @@ Reply reply_with_file(const Request& request, const StoredFile& file) {
   if (!accepts(request.head.header("accept"), file.media_type))
     return tl::unexpected(Problem{"not-acceptable", "It can only be sent as " + file.media_type + "."});
   const std::string tag = '"' + file.sha256 + '"';
-  Response response{200, {{"ETag", tag}, {"Accept-Ranges", "bytes"}, {"Cache-Control", "private, no-cache"}}};
+  Response response{200, {{"ETag", tag}, {"Accept-Ranges", "bytes"}, {"Cache-Control", "no-store"}}};
   if (if_none_match_names(request.head, tag)) {
     response.status = 304;
     return response;

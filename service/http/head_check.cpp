@@ -41,6 +41,8 @@ tl::expected<void, Problem> check_request_line(std::string_view line, Head& head
     return refuse("unknown-method", "Only GET, HEAD, POST, PUT, PATCH, DELETE and OPTIONS are known.");
   if (head.target.size() > kMaxTargetBytes)
     return refuse("uri-too-long", "A request target may have 4096 bytes.");
+  if (head.target.find(' ') != std::string::npos)
+    return refuse("bad-target", "A request target has no spaces.");
   head.http_1_0 = version == "HTTP/1.0";
   head.keep_alive = !head.http_1_0;
   return {};

@@ -3,6 +3,7 @@
 #include "service/http/ascii.h"
 #include "service/http/problem_types.h"
 #include "service/http/routes.h"
+#include "service/jobs/tokens.h"
 
 namespace volsmooth {
 namespace {
@@ -82,6 +83,13 @@ json responses_of(const Route& route) {
   return {{std::to_string(answer.status), success}, {"default", problem}};
 }
 
+/// Of a bearer token OpenAPI 3.1 lets the list say the roles.
+json security_of(const Route& route) {
+  if (!route.scope) return json::array();
+  const json roles = json::array({name_of(*route.scope)});
+  return json::array({json{{"token", roles}}});
+}
+
 /// Such as "post_v1_jobs_id_cancel".
 std::string operation_id(const Route& route) {
   std::string id = lowered(route.method);
@@ -100,19 +108,28 @@ json openapi_document(const std::vector<MethodInfo>& methods) {
     json operation = {{"operationId", operation_id(route)},
                       {"summary", route.summary},
                       {"parameters", parameters_of(route)},
-                      {"responses", responses_of(route)}};
+                      {"responses", responses_of(route)},
+                      {"security", security_of(route)}};
     if (route.body != BodyKind::kNone) operation["requestBody"] = body_of(route);
     paths[std::string(route.pattern)][lowered(route.method)] = std::move(operation);
   }
-  return {{"openapi", "3.1.0"},
-          {"info",
-           {{"title", "volsmooth"},
-            {"version", VOLSMOOTH_VERSION},
-            {"description", "Smooths medical volumes: all isosurfaces at once, by mean curvature flow."}}},
-          {"servers", {{{"url", "/"}}}},
-          {"security", json::array()},
-          {"paths", paths},
-          {"components", {{"schemas", document_schemas(methods)}}}};
+  return {
+      {"openapi", "3.1.0"},
+      {"info",
+       {{"title", "volsmooth"},
+        {"version", VOLSMOOTH_VERSION},
+        {"description", "Smooths medical volumes: all isosurfaces at once, by mean curvature flow."}}},
+      {"servers", {{{"url", "/"}}}},
+      {"paths", paths},
+      {"components",
+       {{"schemas", document_schemas(methods)},
+        {"securitySchemes",
+         {{"token",
+           {{"type", "http"},
+            {"scheme", "bearer"},
+            {"description",
+             "A token of volsmoothd token create, with the scope that each call names (admin covers all). "
+             "Needed from the first token on."}}}}}}}};
 }
 
 }  // namespace volsmooth

@@ -22,6 +22,8 @@ constexpr auto kTypes = std::to_array<ProblemType>({
     {"content-too-large", 413, "The body is too large"},
     {"cross-origin", 403, "A page of another site sent this"},
     {"expectation-failed", 417, "Unknown expectation"},
+    {"insufficient-scope", 403, "The token does not allow this"},
+    {"unauthenticated", 401, "No valid token"},
     {"header-too-large", 431, "The request head is too large"},
     {"length-required", 411, "A body is needed"},
     {"misdirected-request", 421, "This host is not served here"},

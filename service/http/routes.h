@@ -37,7 +37,8 @@ struct Answer {
 /// document are all made from this table.
 struct Route {
   std::string_view method;
-  std::string_view pattern;  ///< such as "/v1/jobs/{id}"
+  std::string_view pattern;    ///< such as "/v1/jobs/{id}"
+  std::optional<Scope> scope;  ///< that a caller needs; none: anybody may
   std::string_view summary;
   Reply (*handle)(Api&, Request&);  ///< may block; given an uploaded file, it may take seconds
   Answer answer;

@@ -17,6 +17,7 @@
 #include "service/http/ascii.h"
 #include "service/http/problem_types.h"
 #include "service/http/session.h"
+#include "service/jobs/tokens.h"
 
 namespace volsmooth {
 namespace {
@@ -55,12 +56,21 @@ tcp::endpoint endpoint_of(const std::string& listen) {
   return {ip, port};
 }
 
-tcp::acceptor listen_on(asio::io_context& io, const tcp::endpoint& endpoint, bool allow_open_network) {
-  if (!endpoint.address().is_loopback() && !allow_open_network)
-    fail("refusing to listen on " + endpoint.address().to_string() +
-         ": the daemon has no access control, so everyone who reaches that address could read and delete the "
-         "volumes. "
-         "Listen on 127.0.0.1, or add --allow-open-network when something in front of it does the checking.");
+/// Why everyone who reaches an address may not be let in; empty: they may.
+std::string exposure(const ServerSettings& settings, const Api& api) {
+  if (settings.tls_certificate.empty())
+    return "without TLS, whoever is on the way could read tokens and volumes. Add --tls-cert and --tls-key";
+  if (!api.jobs.tokens().needed())
+    return "without access tokens, everyone who reaches that address could read and delete the volumes. Make "
+           "one with volsmoothd token create, or add --require-tokens";
+  return {};
+}
+
+tcp::acceptor listen_on(asio::io_context& io, const tcp::endpoint& endpoint, const std::string& exposed) {
+  if (!endpoint.address().is_loopback() && !exposed.empty())
+    fail("refusing to listen on " + endpoint.address().to_string() + ": " + exposed +
+         "; or listen on 127.0.0.1, or add --allow-open-network when something in front of it does the "
+         "checking.");
   try {
     return {io, endpoint, true};
   } catch (const boost::system::system_error& error) {
@@ -101,14 +111,12 @@ stream_protocol::acceptor listen_on(asio::io_context& io, const std::filesystem:
   }
 }
 
-std::string too_many_connections() {
-  const Problem problem{"too-many-connections", "All connections are taken; try again later."};
-  const std::string document = problem_document(problem).dump();
-  return response_head(503, {{"Content-Type", "application/problem+json"},
-                             {"Content-Length", std::to_string(document.size())},
-                             {"Retry-After", "5"},
-                             {"Connection", "close"}}) +
-         document;
+std::shared_ptr<const TlsIdentity> identity_of(const ServerSettings& settings) {
+  if (settings.tls_certificate.empty() && settings.tls_key.empty()) return nullptr;
+  if (settings.tls_certificate.empty() || settings.tls_key.empty())
+    fail("--tls-cert and --tls-key go together");
+  if (settings.listen.starts_with(kUnixPrefix)) fail("a Unix socket needs no TLS");
+  return std::make_shared<const TlsIdentity>(settings.tls_certificate, settings.tls_key);
 }
 
 }  // namespace
@@ -118,8 +126,15 @@ struct Server::State {
       : settings(std::move(given)), context{settings, api,     {},   body_rules(settings, api),
                                             reading,  writing, bulk, auditing,
                                             verifying} {
+    context.tls = identity_of(settings);
     for (const auto& name : settings.host_names) context.hosts.names.push_back(lowered(name));
     listen();
+    // A session that waits for news looks whether its token still holds.
+    api.jobs.tokens().on_change([this] {
+      asio::post(io, [this] {
+        for (Session* session : sessions) session->tell_news();
+      });
+    });
     thread = std::jthread([this] { io.run(); });
   }
 
@@ -134,12 +149,13 @@ struct Server::State {
       address = settings.listen;
       serve(listen_on(io, socket_path));
     } else {
-      auto acceptor = listen_on(io, endpoint_of(settings.listen), settings.allow_open_network);
+      auto acceptor = listen_on(io, endpoint_of(settings.listen),
+                                settings.allow_open_network ? "" : exposure(settings, context.api));
       const auto bound = acceptor.local_endpoint();
       const auto ip = bound.address().to_string();
       const auto host = bound.address().is_v6() ? "[" + ip + "]" : ip;
       if (!bound.address().is_unspecified()) context.hosts.names.push_back(host);
-      address = "http://" + host + ":" + std::to_string(bound.port());
+      address = (context.tls ? "https://" : "http://") + host + ":" + std::to_string(bound.port());
       serve(std::move(acceptor));
     }
   }
@@ -178,15 +194,28 @@ struct Server::State {
     if (context.stopping) return;
     error_code ignored;
     socket.set_option(tcp::no_delay(true), ignored);  // a Unix socket has no such option
-    if (sessions.size() >= static_cast<std::size_t>(settings.max_connections)) {
+    if (sessions.size() >= static_cast<std::size_t>(settings.max_connections) && !make_room()) {
+      if (context.tls) return;  // a handshake would take what there is too little of
       socket.non_blocking(true, ignored);
-      socket.write_some(asio::buffer(too_many_connections()), ignored);
+      socket.write_some(
+          asio::buffer(refusal({"too-many-connections", "All connections are taken; try again later."})),
+          ignored);
       return;
     }
     auto session = std::make_shared<Session>(std::move(socket), context);
     sessions.insert(session.get());
     asio::co_spawn(io, session->run(),
                    [this, session](std::exception_ptr fault) { end(session.get(), fault); });
+  }
+
+  /// Of those that want nothing yet, the one that has wanted it longest goes. False: all are at work.
+  bool make_room() {
+    Session* longest = nullptr;
+    for (Session* session : sessions)
+      if (session->waiting_since() && (!longest || session->waiting_since() < longest->waiting_since()))
+        longest = session;
+    if (longest) longest->make_way();
+    return longest != nullptr;
   }
 
   void end(Session* session, const std::exception_ptr& fault) {
@@ -206,8 +235,14 @@ struct Server::State {
     for (Session* session : sessions) session->wind_down();
   }
 
+  void reload_tls() {
+    const auto fresh = identity_of(settings);
+    asio::post(io, [this, fresh] { context.tls = fresh; });
+  }
+
   void stop() {
     if (!thread.joinable()) return;
+    context.api.jobs.tokens().on_change({});
     asio::post(io, [this] { wind_down(); });
     all_ended.get_future().wait_for(kGrace);
     io.stop();
@@ -239,6 +274,9 @@ Server::~Server() {
 }
 const std::string& Server::address() const {
   return state_->address;
+}
+void Server::reload_tls() {
+  state_->reload_tls();
 }
 void Server::stop() {
   state_->stop();

@@ -15,9 +15,11 @@ struct ServerSettings {
   bool allow_open_network = false;           ///< whether to listen where others than this machine reach it
   std::vector<std::string> host_names = {};  ///< by which it is addressed, beside localhost and the like
   std::int64_t max_upload_bytes = std::int64_t{16} << 30;
-  int max_connections = 1024;
+  int max_connections = 4096;
+  std::filesystem::path tls_certificate = {}, tls_key = {};  ///< PEM; both, or none: in the clear
 
   // Deadlines, in seconds.
+  double handshake_seconds = 10;           ///< of TLS
   double head_seconds = 10;                ///< from the first byte of a request to the end of its head
   double idle_seconds = 60;                ///< between two requests
   double body_seconds = 30;                ///< without a byte of the body
@@ -34,6 +36,10 @@ class Server {
 
   /// Where it listens, as a client would write it: "http://127.0.0.1:8742" or "unix:/run/volsmooth.sock".
   const std::string& address() const;
+
+  /// Reads certificate and key again, for the connections that begin from now on. Throws
+  /// std::runtime_error, and goes on with the old ones, when they cannot be used.
+  void reload_tls();
 
   /// Accepts no more, lets answers that are under way finish for a few seconds, then closes. Repeatable.
   void stop();

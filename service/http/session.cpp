@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "service/http/accept.h"
+#include "service/http/authorization.h"
 #include "service/http/digest_check.h"
 #include "service/http/idempotency.h"
 #include "service/http/metrics.h"
@@ -13,6 +14,7 @@
 namespace volsmooth {
 namespace {
 
+constexpr std::size_t kFirstBlockBytes = 16 * 1024;  ///< slow clients hold no more
 constexpr std::size_t kBodyBlockBytes = 256 * 1024;
 constexpr std::int64_t kMaxDrainedBytes = 65536;
 
@@ -27,7 +29,7 @@ Problem problem_of(ReadFailure failure) {
 }  // namespace
 
 Session::Session(Socket socket, SessionContext& context)
-    : connection_(std::move(socket)), context_(context) {}
+    : connection_(std::move(socket), context.tls.get()), context_(context) {}
 
 Problem Session::fault(const Exchange& exchange, const std::exception& error) {
   const auto id = exchange.record.id;
@@ -40,16 +42,29 @@ Problem Session::fault(const Exchange& exchange, const std::exception& error) {
 
 void Session::wind_down() {
   if (idle_) connection_.cancel();
+  tell_news();
+}
+
+void Session::make_way() {
+  made_way_ = true;
+  connection_.cancel();
+}
+
+void Session::tell_news() {
   if (wake_) wake_->wake();
 }
 
 boost::asio::awaitable<void> Session::run() {
-  for (bool more = true; more && !context_.stopping;) more = co_await serve_one();
-  if (unread_) co_await connection_.close_gently();
+  idle_ = true;
+  const bool begun = co_await connection_.begin(context_.settings.handshake_seconds);
+  idle_ = false;
+  for (bool more = begun; more && !context_.stopping;) more = co_await serve_one();
+  if (unread_ && !made_way_) co_await connection_.close_gently();
 }
 
 Session::Awaitable<bool> Session::serve_one() {
   idle_ = true;
+  waiting_since_ = std::chrono::steady_clock::now();
   const bool begun = co_await connection_.wait_for_request(context_.settings.idle_seconds);
   idle_ = false;
   if (!begun) co_return false;
@@ -73,6 +88,7 @@ Session::Awaitable<bool> Session::serve_one() {
 
 Session::Awaitable<void> Session::serve(Exchange& exchange) {
   const auto bytes = co_await connection_.read_head(context_.settings.head_seconds);
+  waiting_since_.reset();
   if (!bytes) {
     if (bytes.error() == ReadFailure::kTimeout)
       co_await send(exchange, tl::unexpected(problem_of(bytes.error())));
@@ -115,7 +131,9 @@ tl::expected<void, Problem> Session::admit(Exchange& exchange) const {
   auto match = match_route(request.head.method, target->segments);
   if (!match) return tl::unexpected(match.error());
   exchange.route = match->route;
-  request.caller = Caller::anyone();
+  auto caller = authorize(request.head, *exchange.route, context_.api.jobs.tokens());
+  if (!caller) return tl::unexpected(caller.error());
+  request.caller = std::move(*caller);
   request.path = std::move(match->path);
   request.query = std::move(target->query);
   if (auto checked = check_query(*exchange.route, request.query); !checked) return checked;
@@ -131,6 +149,11 @@ tl::expected<void, Problem> Session::admit(Exchange& exchange) const {
 Actor Session::actor_of(const Exchange& exchange) {
   const Caller& caller = exchange.request.caller;
   return {caller.tenant, caller.token, exchange.record.id};
+}
+
+tl::expected<void, Problem> Session::check_current(const Exchange& exchange) const {
+  if (!exchange.route->scope || context_.api.jobs.tokens().is_current(exchange.request.caller)) return {};
+  return tl::unexpected(Problem{"unauthenticated", "The token has expired or was revoked meanwhile."});
 }
 
 Session::Awaitable<void> Session::handle(Exchange& exchange, std::unique_ptr<BodyReceiver> receiver) {
@@ -181,16 +204,19 @@ Session::Awaitable<tl::expected<void, Problem>> Session::receive_body(Exchange& 
       !co_await connection_.write("HTTP/1.1 100 Continue\r\n\r\n", context_.settings.write_seconds))
     co_return tl::unexpected(problem_of(ReadFailure::kClosed));
 
-  const auto wanted = std::min<std::int64_t>(head.content_length.value_or(kBodyBlockBytes), kBodyBlockBytes);
+  const auto wanted =
+      std::min<std::int64_t>(head.content_length.value_or(kFirstBlockBytes), kFirstBlockBytes);
   std::vector<char> block(static_cast<std::size_t>(head.has_body() ? wanted : 1));
   ThreadPool& pool = exchange.request.file ? context_.bulk : context_.reading;
   for (;;) {
     const auto bytes = co_await connection_.read_body(block, context_.settings.body_seconds);
     if (!bytes) co_return tl::unexpected(problem_of(bytes.error()));
+    if (auto current = check_current(exchange); !current) co_return current;
     if (bytes->empty()) co_return tl::expected<void, Problem>();
     exchange.record.bytes_in += static_cast<std::int64_t>(bytes->size());
     auto taken = co_await run_guarded(pool, exchange, [&] { return receiver.receive(*bytes); });
     if (!taken) co_return taken;
+    if (bytes->size() == block.size()) block.resize(std::min(2 * block.size(), kBodyBlockBytes));
   }
 }
 

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
+#include <chrono>
 #include <memory>
+#include <optional>
 
 #include "service/http/body_receiver.h"
 #include "service/http/connection.h"
@@ -26,6 +28,7 @@ struct SessionContext {
   ThreadPool& bulk;     ///< for the bytes of files: as slow as the disk
   ThreadPool& auditing;   ///< for rows of the audit; many, since those that wait together share an fsync
   ThreadPool& verifying;  ///< for handlers that were given a file: seconds
+  std::shared_ptr<const TlsIdentity> tls = {};  ///< of new connections; none: they are in the clear
   std::uint64_t last_request = 0;
   bool stopping = false;
 };
@@ -36,6 +39,14 @@ class Session {
   Session(Socket socket, SessionContext& context);
 
   boost::asio::awaitable<void> run();
+
+  /// Wakes it while it waits for news, such as that tokens have changed.
+  void tell_news();
+
+  /// Since when it waits for a request or the rest of its head; none: it is at work.
+  std::optional<std::chrono::steady_clock::time_point> waiting_since() const { return waiting_since_; }
+  /// Ends it while it waits, without a word.
+  void make_way();
 
   /// Ends a wait for a request or for news; lets an answer that is under way finish.
   void wind_down();
@@ -72,6 +83,8 @@ class Session {
   Awaitable<tl::expected<void, Problem>> receive_body(Exchange& exchange, BodyReceiver& receiver);
 
   tl::expected<void, Problem> admit(Exchange& exchange) const;
+  /// Whether what its token allowed at the beginning still is: unauthenticated.
+  tl::expected<void, Problem> check_current(const Exchange& exchange) const;
 
   static Actor actor_of(const Exchange& exchange);
   Awaitable<void> send(Exchange& exchange, Reply reply);
@@ -84,6 +97,8 @@ class Session {
   Connection connection_;
   SessionContext& context_;
   bool idle_ = false;
+  bool made_way_ = false;
+  std::optional<std::chrono::steady_clock::time_point> waiting_since_ = std::chrono::steady_clock::now();
   bool unread_ = false;         ///< whether the peer may still be sending what nobody will read
   std::shared_ptr<Wake> wake_;  ///< while it waits for news
 };

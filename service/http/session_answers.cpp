@@ -12,9 +12,21 @@ namespace {
 constexpr std::int64_t kFileBlockBytes = BlockSums::kBlockBytes;  // each is read, checked and sent whole
 constexpr int kRetrySeconds = 5;
 
+/// What no browser is to make of an answer: it is data, of this site alone.
+const std::vector<HeaderField> kSafety = {
+    {"X-Content-Type-Options", "nosniff"},
+    {"Content-Security-Policy", "default-src 'none'; frame-ancestors 'none'; sandbox"},
+    {"Cross-Origin-Resource-Policy", "same-origin"},
+    {"Referrer-Policy", "no-referrer"},
+};
+
 /// The fields that go with a problem beside its document.
 std::vector<HeaderField> fields_for(const Problem& problem, int status) {
   std::vector<HeaderField> fields = {{"Cache-Control", "no-store"}};
+  if (status == 401) fields.push_back({"WWW-Authenticate", R"(Bearer realm="volsmooth")"});
+  if (problem.slug == "insufficient-scope")
+    fields.push_back({"WWW-Authenticate", R"(Bearer realm="volsmooth", error="insufficient_scope", scope=")" +
+                                              problem.members.value("scope", "") + '"'});
   if (status == 405) fields.push_back({"Allow", problem.members.value("allow", "")});
   if (status == 416)
     fields.push_back(
@@ -68,8 +80,9 @@ Session::Awaitable<void> Session::send(Exchange& exchange, Reply reply) {
 
   auto fields = std::move(response.headers);
   std::visit([&](const auto& body) { describe(body, response.status, fields); }, response.body);
-  fields.push_back({"X-Content-Type-Options", "nosniff"});
   fields.push_back({"X-Request-Id", exchange.record.id});
+  for (const HeaderField& field : kSafety) fields.push_back(field);
+  if (context_.tls) fields.push_back({"Strict-Transport-Security", "max-age=31536000"});
   if (stream && !head.http_1_0) fields.push_back({"Transfer-Encoding", "chunked"});
   if (!exchange.keep_alive) fields.push_back({"Connection", "close"});
 
@@ -111,7 +124,8 @@ Session::Awaitable<bool> Session::send_file(Exchange& exchange, const FileBody& 
         body.file->read(at, std::as_writable_bytes(std::span(block)));
         return {};
       });
-      if (!read || !co_await write(exchange, {block.data(), block.size()})) co_return false;
+      if (!read || !check_current(exchange)) co_return false;
+      if (!co_await write(exchange, {block.data(), block.size()})) co_return false;
     }
   }
   co_return true;
@@ -126,7 +140,7 @@ Session::Awaitable<bool> Session::send_events(Exchange& exchange, EventStream& s
   };
 
   bool connected = true;
-  for (bool last = false; connected && !last && !context_.stopping;) {
+  for (bool last = false; connected && !last && !context_.stopping && check_current(exchange);) {
     auto batch = co_await run_guarded(context_.reading, exchange, [&] { return stream.next(); });
     if (!batch) break;  // the job is gone, and with it what there was to say
     last = batch->last;
@@ -163,6 +177,10 @@ Session::Awaitable<Reply> Session::wait_for(Exchange& exchange, LongPoll& poll, 
     waiting = !answer->final && !context_.stopping && std::chrono::steady_clock::now() < end &&
               !connection_.peer_has_closed();
     if (waiting) co_await wake_->sleep_until(end);
+    if (const auto current = check_current(exchange); !current) {
+      reply = tl::unexpected(current.error());
+      break;
+    }
   }
   if (reply) reply->headers.push_back({"ETag", entity_tag(std::get<Document>(reply->body).bytes)});
   connection_.cancel();

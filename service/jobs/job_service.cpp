@@ -46,6 +46,10 @@ const Engine& JobService::engine() const {
   return state_->engine;
 }
 
+Tokens& JobService::tokens() {
+  return state_->tokens;
+}
+
 tl::expected<IncomingFile, Problem> JobService::begin_upload(std::optional<std::int64_t> declared_bytes) {
   const std::int64_t bytes = declared_bytes.value_or(0);
   if (bytes > state_->settings.max_upload_bytes) return too_large(state_->settings.max_upload_bytes);

@@ -21,6 +21,8 @@
 
 namespace volsmooth {
 
+class Tokens;
+
 struct JobServiceSettings {
   std::filesystem::path data_dir;       ///< locked for this process; created when missing
   int workers = 3;                      ///< jobs that run at the same time, one of them a job of seconds
@@ -100,6 +102,7 @@ class JobService {
   void stop();
 
   const Engine& engine() const;
+  Tokens& tokens();  ///< by which its callers are known
 
   tl::expected<IncomingFile, Problem> begin_upload(std::optional<std::int64_t> declared_bytes);
   tl::expected<StoredVolume, Problem> keep_volume(const Caller& caller, IncomingFile file,

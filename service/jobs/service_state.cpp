@@ -44,6 +44,7 @@ JobService::State::State(JobServiceSettings given, Engine computing, Pacs networ
       database(files.path_of("volsmooth.db"), settings.clock),
       audit_queue(database),
       stored_files(database, files),
+      tokens(database),
       volumes(database),
       jobs(database),
       deliveries(database),

@@ -17,6 +17,7 @@
 #include "service/jobs/running_jobs.h"
 #include "service/jobs/scrubber.h"
 #include "service/jobs/source_runner.h"
+#include "service/jobs/tokens.h"
 #include "service/jobs/volume_store.h"
 #include "service/jobs/wake_list.h"
 #include "service/jobs/worker_pool.h"
@@ -78,6 +79,7 @@ struct JobService::State {
   StoreDatabase database;
   AuditQueue audit_queue;
   StoredFiles stored_files;
+  Tokens tokens;
   VolumeStore volumes;
   JobStore jobs;
   DeliveryStore deliveries;

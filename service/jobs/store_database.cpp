@@ -192,9 +192,22 @@ constexpr const char* kAudit = R"(
   ALTER TABLE audit ADD COLUMN hash TEXT NOT NULL DEFAULT '';
 )";
 
+/// Also those that were revoked: a name is of one token for ever.
+constexpr const char* kTokens = R"(
+  CREATE TABLE tokens (
+    name       TEXT PRIMARY KEY,
+    sha256     TEXT NOT NULL,
+    tenant     TEXT NOT NULL,
+    scopes     TEXT NOT NULL,
+    created_ms INTEGER NOT NULL,
+    expires_ms INTEGER,
+    revoked_ms INTEGER
+  ) STRICT, WITHOUT ROWID;
+)";
+
 /// What makes each version of the schema of the one before.
-constexpr std::array kVersions = {kFirstSchema, kIndexByState, kNodes,   kLongJobs,
-                                  kTenants,     kStoredFiles,  kKeeping, kAudit};
+constexpr std::array kVersions = {kFirstSchema, kIndexByState, kNodes, kLongJobs, kTenants,
+                                  kStoredFiles, kKeeping,      kAudit, kTokens};
 /// The last version in which the audit was no chain yet.
 constexpr std::size_t kUnlinkedAudit = std::ranges::find(kVersions, kAudit) - kVersions.begin();
 constexpr std::size_t kNewestVersion = kVersions.size();

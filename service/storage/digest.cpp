@@ -1,6 +1,7 @@
 #include "service/storage/digest.h"
 
 #include <fcntl.h>
+#include <openssl/crypto.h>
 #include <openssl/evp.h>
 
 #include <array>
@@ -55,6 +56,10 @@ std::string sha256_of(std::string_view text) {
   Sha256 sha256;
   sha256.update(std::as_bytes(std::span(text)));
   return sha256.hex();
+}
+
+bool is_same_digest(std::string_view one, std::string_view other) {
+  return one.size() == other.size() && CRYPTO_memcmp(one.data(), other.data(), one.size()) == 0;
 }
 
 FileDigest digest_of(const std::filesystem::path& file, const std::function<void()>& between_blocks) {

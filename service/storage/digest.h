@@ -28,6 +28,9 @@ class Sha256 {
 /// Of all of a text, hex.
 std::string sha256_of(std::string_view text);
 
+/// Takes as long for digests that differ early as for those that differ late.
+bool is_same_digest(std::string_view one, std::string_view other);
+
 struct FileDigest {
   std::int64_t bytes = 0;
   std::string sha256;

@@ -30,6 +30,7 @@ const std::map<std::string, std::vector<std::string>> kMayInclude = {
       "algorithms/surface/mesh.h", "algorithms/surface/vector_math.h"}},
     {"service", {"service/"}},
     {"service/process", {}},
+    {"service/control", {"service/process/descriptor.h"}},
     {"service/storage", {}},
     {"service/jobs", {"service/storage/", "algorithms/method_info.h", "algorithms/progress.h"}},
     {"service/http",

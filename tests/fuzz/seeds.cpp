@@ -73,10 +73,27 @@ void write_nifti(const fs::path& folder) {
   write(folder / "gzip" / "zeros", gzipped(ByteVector(100'000)));
 }
 
+void write_http(const fs::path& folder) {
+  const std::string host = " HTTP/1.1\r\nHost: localhost\r\n";
+  const std::string chunked = host + "Transfer-Encoding: chunked\r\n\r\n";
+  write(folder / "get", "GET /v1/jobs?limit=2&state=queued" + host + "Accept: */*\r\n\r\n");
+  write(folder / "head_1_0", "HEAD /healthz HTTP/1.0\r\nHost: [::1]:8742\r\nConnection: close\r\n\r\n");
+  write(folder / "post",
+        "POST /v1/volumes" + host + "Content-Length: 5\r\nExpect: 100-continue\r\n\r\nhello");
+  write(folder / "chunked", "POST /v1/volumes" + chunked + "2;a=b\r\nhe\r\n3\r\nllo\r\n0\r\nX: y\r\n\r\n");
+  write(folder / "delete", "DELETE /v1/jobs/j-aaaaaaaaaaaaaaaa" + host + "If-Match: \"x\"\r\n\r\n");
+  write(folder / "both",
+        "POST /v1/jobs" + host + "Content-Length: 2\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n");
+  write(folder / "escaped",
+        "GET /v1/jobs/%2e%2e%2fx?cursor=%41" + host + "Origin: https://localhost\r\n\r\n");
+  write(folder / "bare", "GET /healthz HTTP/1.1\nHost: localhost\n\n");
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   if (argc != 2) return 2;
   write_dicom(fs::path(argv[1]) / "dicom");
   write_nifti(argv[1]);
+  write_http(fs::path(argv[1]) / "http_head");
 }

@@ -29,7 +29,7 @@ class Daemon {
     command.insert(command.end(), options_.begin(), options_.end());
     process_.emplace(command, log, log);
     logs_.push_back(log);
-    static const std::regex listening(R"(listening on http://127\.0\.0\.1:(\d+))");
+    static const std::regex listening(R"(listening on (https?)://127\.0\.0\.1:(\d+))");
     std::smatch match;
     std::string text;
     const bool up = eventually([&] {
@@ -37,7 +37,8 @@ class Daemon {
       return std::regex_search(text, match, listening) || !process_->running();
     });
     if (!up || match.empty()) throw std::runtime_error("volsmoothd did not start:\n" + text);
-    port_ = std::stoi(match[1]);
+    scheme_ = match[1];
+    port_ = std::stoi(match[2]);
   }
 
   void kill() { process_->kill_and_wait(SIGKILL); }
@@ -47,7 +48,7 @@ class Daemon {
 
   pid_t pid() const { return process_->pid(); }
   int port() const { return port_; }
-  std::string url() const { return "http://127.0.0.1:" + std::to_string(port_); }
+  std::string url() const { return scheme_ + "://127.0.0.1:" + std::to_string(port_); }
   const std::filesystem::path& data() const { return data_; }
 
   /// All that it has logged so far, over all starts.
@@ -79,6 +80,7 @@ class Daemon {
   std::vector<std::filesystem::path> logs_;
   std::optional<ChildProcess> process_;
   int starts_ = 0;
+  std::string scheme_;
   int port_ = 0;
 };
 

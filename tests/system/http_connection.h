@@ -66,6 +66,7 @@ class HttpConnection {
     return true;
   }
 
+  int descriptor() const { return socket_; }
   void finish_sending() { shutdown(socket_, SHUT_WR); }
 
   /// One answer; none when the daemon closes (or is silent) before a whole one came.

@@ -237,9 +237,27 @@ TEST_F(Framing, ConnectionCloseIsHonoured) {
 TEST_F(Framing, SurplusConnectionsAreRefused) {
   start({.listen = "127.0.0.1:0", .max_connections = 1});
   auto first = connect();
-  EXPECT_EQ(first.exchange(request("GET /healthz")).status, 200);
+  first.send(
+      "POST /v1/volumes HTTP/1.1\r\nHost: localhost\r\nExpect: 100-continue\r\nContent-Length: 6\r\n\r\n");
+  EXPECT_EQ(first.receive().status, 100);
   auto second = connect();
   EXPECT_EQ(second.receive().status, 503);
+  EXPECT_EQ(first.exchange("voxels").status, 201);
+}
+
+TEST_F(Framing, ConnectionsThatWantNothingMakeWay) {
+  start({.listen = "127.0.0.1:0", .max_connections = 2});
+  auto idle = connect(), half_a_head = connect();
+  EXPECT_EQ(idle.exchange(request("GET /healthz")).status, 200);
+  EXPECT_EQ(half_a_head.exchange(request("GET /healthz")).status, 200);
+  half_a_head.send("GET /healthz HTTP/1.1\r\n");
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  std::vector<std::unique_ptr<HttpClient>> others;
+  for (HttpClient* const longest : {&idle, &half_a_head}) {
+    others.push_back(std::make_unique<HttpClient>(server_->address()));
+    EXPECT_EQ(others.back()->exchange(request("GET /healthz")).status, 200);
+    EXPECT_TRUE(longest->is_closed());
+  }
 }
 
 TEST_F(Framing, UnixSocketServesTheSame) {

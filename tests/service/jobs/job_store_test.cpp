@@ -287,7 +287,7 @@ TEST(StoreDatabase, TakesOverWhatAnEarlierVersionWrote) {
         "WHERE state IN ('queued', 'running'); DROP TABLE delivered_instances; DROP TABLE deliveries; DROP "
         "TABLE arrivals; "
         "ALTER TABLE jobs DROP COLUMN not_before_ms; ALTER TABLE jobs DROP COLUMN source_tries; "
-        "ALTER TABLE jobs DROP COLUMN is_long; DROP TABLE stored_files; "
+        "ALTER TABLE jobs DROP COLUMN is_long; DROP TABLE stored_files; DROP TABLE tokens; "
         "ALTER TABLE audit DROP COLUMN hash; ALTER TABLE audit DROP COLUMN outcome; ALTER TABLE audit DROP "
         "COLUMN "
         "request; ALTER TABLE audit DROP COLUMN token; ALTER TABLE audit DROP COLUMN tenant; "

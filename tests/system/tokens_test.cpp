@@ -1,0 +1,183 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/system/client_run.h"
+#include "tests/system/nifti_bytes.h"
+#include "tests/system/service_client.h"
+#include "tests/system/tenants.h"
+
+namespace volsmooth::test {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::HasSubstr;
+using testing::Not;
+
+/// A command of volsmoothd on a data folder, beside a daemon or without one.
+struct Command {
+  int exit_code;
+  std::string output, error;
+
+  static Command run(std::vector<std::string> arguments, const std::filesystem::path& data) {
+    const TemporaryDirectory folder;
+    arguments.insert(arguments.begin(), VOLSMOOTHD);
+    arguments.insert(arguments.end(), {"--data", data.string()});
+    const int code = ChildProcess(arguments, folder / "out", folder / "err").wait();
+    return {code, content_of(folder / "out"), content_of(folder / "err")};
+  }
+};
+
+std::string make_token(const std::filesystem::path& data, const std::string& name, const std::string& scope,
+                       std::vector<std::string> more = {}) {
+  std::vector<std::string> arguments = {"token", "create", "--name", name, "--scope", scope};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  const Command made = Command::run(arguments, data);
+  EXPECT_EQ(made.exit_code, 0) << made.error;
+  return made.output.substr(0, made.output.find('\n'));
+}
+
+int status_with(const Daemon& daemon, const std::string& token, const std::string& target = "/v1/jobs") {
+  return HttpConnection(daemon.port())
+      .exchange("GET", target, {}, {{"Authorization", "Bearer " + token}})
+      .status;
+}
+
+TEST(Tokens, AreMadeAndRevokedWhileTheDaemonRuns) {
+  Daemon daemon(VOLSMOOTHD);
+  EXPECT_EQ(ServiceClient(daemon).call("GET", "/v1/jobs").status, 200);
+  const std::string reader = make_token(daemon.data(), "reader", "read");
+  EXPECT_EQ(ServiceClient(daemon).call("GET", "/v1/jobs").status, 401);
+  EXPECT_EQ(status_with(daemon, reader), 200);
+  EXPECT_EQ(status_with(daemon, reader, "/metrics"), 403);
+
+  ASSERT_EQ(Command::run({"token", "revoke", "--name", "reader"}, daemon.data()).exit_code, 0);
+  EXPECT_EQ(status_with(daemon, reader), 401);
+  const Command listed = Command::run({"token", "list"}, daemon.data());
+  EXPECT_THAT(listed.output, testing::MatchesRegex("reader\tdefault\tread\trevoked 20.*Z\n"));
+  EXPECT_EQ(Command::run({"token", "revoke", "--name", "nobody"}, daemon.data()).exit_code, 1);
+}
+
+TEST(Tokens, AreMadeAndRevokedWithoutADaemon) {
+  Daemon daemon(VOLSMOOTHD);
+  daemon.terminate();
+  const std::string kept = make_token(daemon.data(), "kept", "read,submit", {"--tenant", "ward-a"});
+  const std::string revoked = make_token(daemon.data(), "revoked", "admin");
+  const std::string passing = make_token(daemon.data(), "passing", "admin", {"--expires", "1s"});
+  ASSERT_EQ(Command::run({"token", "revoke", "--name", "revoked"}, daemon.data()).exit_code, 0);
+  daemon.start();
+  EXPECT_EQ(status_with(daemon, kept), 200);
+  EXPECT_EQ(status_with(daemon, revoked), 401);
+  EXPECT_TRUE(eventually([&] { return status_with(daemon, passing) == 401; }));
+  EXPECT_EQ(ServiceClient(daemon).call("GET", "/healthz").status, 200);
+}
+
+TEST(Tokens, AnswerToMistakes) {
+  const TemporaryDirectory folder;
+  for (const std::vector<std::string>& wrong :
+       {std::vector<std::string>{"token", "create", "--scope", "read"},
+        {"token", "create", "--name", "x", "--scope", "write"},
+        {"token", "create", "--name", "a b", "--scope", "read"},
+        {"token", "create", "--name", "x", "--scope", "read", "--expires", "soon"},
+        {"token"},
+        {"status"}}) {
+    const Command run = Command::run(wrong, folder / "data");
+    EXPECT_NE(run.exit_code, 0);
+    EXPECT_FALSE(run.error.empty());
+    EXPECT_TRUE(run.output.empty()) << run.output;
+  }
+  EXPECT_EQ(make_token(folder / "data", "x", "read").substr(0, 12), "volsmooth_x_");
+}
+
+TEST(Tokens, StatusIsTheDaemons) {
+  Daemon daemon(VOLSMOOTHD);
+  EXPECT_EQ(Command::run({"status"}, daemon.data()).output, "ready\n");
+  daemon.kill();
+  EXPECT_EQ(Command::run({"status"}, daemon.data()).exit_code, 1);
+}
+
+/// What the client needs: a token by file or environment; exit code 77 without.
+TEST(Tokens, LetTheClientIn) {
+  Daemon daemon(VOLSMOOTHD);
+  const TemporaryDirectory folder;
+  const std::string token = make_token(daemon.data(), "client", "read,submit");
+  write_file(folder / "token", token + "\n");
+  write_file(folder / "ball.nii", ball_file());
+  ClientRun refused({"volumes", "--server", daemon.url()});
+  EXPECT_EQ(refused.exit_code(), 77);
+  EXPECT_THAT(refused.error(), HasSubstr("token"));
+  ClientRun smooth({"smooth", (folder / "ball.nii").string(), "-o", (folder / "out").string(), "--server",
+                    daemon.url(), "--token-file", (folder / "token").string()});
+  EXPECT_EQ(smooth.exit_code(), 0) << smooth.error();
+}
+
+/// The long form is measure_tenants.
+TEST(Tokens, LeaveNoWayToAnotherTenantsThings) {
+  Daemon daemon(VOLSMOOTHD);
+  const std::string owner = make_token(daemon.data(), "owner", "admin", {"--tenant", "ward-a"});
+  const std::string stranger = make_token(daemon.data(), "stranger", "admin", {"--tenant", "ward-b"});
+  TwoTenants tenants(daemon, owner, stranger);
+  EXPECT_EQ(tenants.leaks(300, 1), 0);
+  EXPECT_TRUE(tenants.is_untouched());
+}
+
+TEST(Tls, IsWhatTheClientAndTheDaemonSpeak) {
+  const TemporaryDirectory folder;
+  const std::string certificate = folder / "cert.pem", key = folder / "key.pem";
+  const auto make = [&] {
+    EXPECT_EQ(
+        ChildProcess({"/usr/bin/openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt",
+                      "ec_paramgen_curve:P-256", "-nodes", "-days", "1", "-subj", "/CN=localhost", "-addext",
+                      "subjectAltName=DNS:localhost,IP:127.0.0.1", "-keyout", key, "-out", certificate},
+                     folder / "openssl.out", folder / "openssl.err")
+            .wait(),
+        0);
+  };
+  make();
+  Daemon daemon(VOLSMOOTHD, {"--tls-cert", certificate, "--tls-key", key});
+  EXPECT_THAT(daemon.url(), testing::StartsWith("https://"));
+  write_file(folder / "ball.nii", ball_file());
+  const auto run = [&](std::vector<std::string> more) {
+    std::vector<std::string> arguments = {
+        "smooth",    (folder / "ball.nii").string(), "-o", (folder / "out").string(), "--force", "--server",
+        daemon.url()};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    ClientRun client(arguments);
+    const int code = client.exit_code();
+    return std::pair(code, client.error());
+  };
+  EXPECT_EQ(run({"--ca-file", certificate}).first, 0) << run({"--ca-file", certificate}).second;
+  const auto [code, error] = run({});
+  EXPECT_EQ(code, 69);
+  EXPECT_THAT(error, HasSubstr("--ca-file"));
+  EXPECT_EQ(HttpConnection(daemon.port()).exchange("GET", "/healthz").status, 400) << "in the clear";
+
+  const std::string old = content_of(certificate);
+  make();
+  write_file(folder / "old.pem", old);
+  ::kill(daemon.pid(), SIGHUP);
+  EXPECT_TRUE(eventually([&] { return daemon.log().find("tls-reloaded") != std::string::npos; }));
+  EXPECT_EQ(run({"--ca-file", (folder / "old.pem").string()}).first, 69);
+  EXPECT_EQ(run({"--ca-file", certificate}).first, 0);
+}
+
+TEST(Tokens, AreInNoLogMetricOrAnswer) {
+  Daemon daemon(VOLSMOOTHD);
+  const std::string token = make_token(daemon.data(), "admin", "admin");
+  const std::string secret = token.substr(token.rfind('_') + 1);
+  for (const std::string& target : {std::string("/v1/jobs"), "/v1/jobs?access_token=" + token,
+                                    "/v1/jobs/" + token, "/v1/volumes/" + secret, "/" + token})
+    for (const std::string& sent : {token, "x" + token, token + "x"})
+      EXPECT_THAT(HttpConnection(daemon.port())
+                      .exchange("GET", target, {}, {{"Authorization", "Bearer " + sent}})
+                      .body,
+                  Not(HasSubstr(secret)));
+  const HttpResponse metrics =
+      HttpConnection(daemon.port()).exchange("GET", "/metrics", {}, {{"Authorization", "Bearer " + token}});
+  EXPECT_EQ(metrics.status, 200);
+  EXPECT_THAT(metrics.body, Not(HasSubstr(secret)));
+  EXPECT_THAT(daemon.log(), Not(HasSubstr(secret)));
+  EXPECT_THAT(Command::run({"token", "list"}, daemon.data()).output, Not(HasSubstr(secret)));
+}
+
+}  // namespace
+}  // namespace volsmooth::test
