@@ -96,6 +96,20 @@ void declare(CLI::App& app, Options& options) {
       ->envname("VOLSMOOTH_SCRUB_DAYS")
       ->check(CLI::Range(0, 3650))
       ->capture_default_str();
+  app.add_option(
+         "--tenant-storage", options.jobs.tenant_max_bytes,
+         "Volumes and results that are kept for one tenant, such as 500GB; 0: as much as the disk holds")
+      ->envname("VOLSMOOTH_TENANT_STORAGE")
+      ->transform(CLI::AsSizeValue(false))
+      ->capture_default_str();
+  app.add_option("--tenant-queue", options.jobs.tenant_max_queued, "Jobs of one tenant that may wait")
+      ->envname("VOLSMOOTH_TENANT_QUEUE")
+      ->check(CLI::Range(1, 1'000'000))
+      ->capture_default_str();
+  app.add_option("--queue", options.jobs.max_queued, "Jobs of all tenants that may wait")
+      ->envname("VOLSMOOTH_QUEUE")
+      ->check(CLI::Range(1, 1'000'000))
+      ->capture_default_str();
   app.add_option("--ingest", options.ingest_program,
                  "volsmooth-ingest, which reads DICOM; default: beside this program")
       ->envname("VOLSMOOTH_INGEST");
@@ -169,7 +183,7 @@ void reload_tls(Server& server) {
 void listen_for_devices(const Options& options, JobService& jobs, std::optional<DimseListener>& listener) {
   if (options.dimse_listen.empty()) return;
   Inbox inbox;
-  inbox.begin = [&jobs] { return jobs.begin_upload(std::nullopt); };
+  inbox.begin = [&jobs] { return jobs.begin_upload(Caller::anyone(), std::nullopt); };
   inbox.keep = [&jobs, &options](const std::string& name, IncomingFile file) {
     const auto preset = std::ranges::find(options.presets, name, &Preset::name);
     const Caller device{preset->tenant, "", {Scope::kSubmit}};

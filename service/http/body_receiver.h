@@ -22,7 +22,9 @@ inline constexpr std::int64_t kMaxTextBytes = std::int64_t{1} << 20;
 
 struct BodyRules {
   std::int64_t max_upload_bytes = 0;
-  std::function<tl::expected<IncomingFile, Problem>(std::optional<std::int64_t> declared_bytes)> begin_upload;
+  std::function<tl::expected<IncomingFile, Problem>(const Caller& caller,
+                                                    std::optional<std::int64_t> declared_bytes)>
+      begin_upload;
 };
 
 /// Puts a body as it arrives into the request it belongs to. Its calls may block on the disk.

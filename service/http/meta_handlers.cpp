@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 
 #include "service/http/answers.h"
@@ -33,7 +34,15 @@ nlohmann::json as_document(const Engine::Format& format) {
 
 Reply get_methods(Api& api, Request&) {
   auto methods = nlohmann::json::array();
-  for (const auto& method : api.jobs.engine().methods) methods.push_back(to_json(method));
+  const Engine& engine = api.jobs.engine();
+  for (const auto& method : engine.methods) {
+    methods.push_back(to_json(method));
+    const auto cost = std::ranges::find(engine.costs, method.name, &Engine::MethodCost::method);
+    if (cost == engine.costs.end()) continue;
+    methods.back()["memory"] = {{"fixed_bytes", cost->fixed_bytes},
+                                {"bytes_per_voxel", cost->bytes_per_voxel},
+                                {"bytes_per_voxel_and_isovalue", cost->bytes_per_voxel_and_isovalue}};
+  }
   return json_response({{"methods", methods}});
 }
 

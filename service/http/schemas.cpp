@@ -119,7 +119,11 @@ const json& fixed_schemas() {
         "name": {"type": "string"},
         "description": {"type": "string"},
         "parameters": {"type": "array", "items": {"$ref": "#/components/schemas/MethodParameter"}},
-        "parts": {"description": "The methods that it runs side by side.", "type": "array", "items": {"type": "string"}}}},
+        "parts": {"description": "The methods that it runs side by side.", "type": "array", "items": {"type": "string"}},
+        "memory": {"description": "What a job takes at its peak, for volumes of up to 256^3 voxels; of larger ones the surfaces grow with the area only. A job is refused when that is more than the service lets one take.",
+          "type": "object", "required": ["fixed_bytes", "bytes_per_voxel", "bytes_per_voxel_and_isovalue"],
+          "properties": {"fixed_bytes": {"type": "integer"}, "bytes_per_voxel": {"type": "number"},
+                         "bytes_per_voxel_and_isovalue": {"type": "number"}}}}},
     "MethodParameter": {
       "type": "object",
       "required": ["name", "description", "type", "unit", "default"],
@@ -176,6 +180,8 @@ json order_schema(const std::vector<MethodInfo>& methods) {
       "outputs": {"type": "array", "default": ["nifti"],
         "description": "All but nifti need a DICOM input.",
         "items": {"enum": ["nifti", "dicom-series", "dicom-stl", "dicom-obj", "dicom-surface-segmentation"]}},
+      "priority": {"type": "integer", "minimum": -60, "maximum": 60, "default": 0,
+                   "description": "Each step is worth a minute of waiting beside the other jobs of the same tenant."},
       "keep_days": {"type": "integer", "minimum": 0, "maximum": 36500,
                     "description": "Days after its end that the job and its results are kept, up to what the service is set to, which is the default. 0: for ever, where the service is set to that."},
       "label": {"type": "string", "description": "Free text of yours."}}

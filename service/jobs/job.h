@@ -78,6 +78,7 @@ struct JobOrder {
   std::string voxel_type = "same";  ///< or "float32"
   std::vector<std::string> outputs = {"nifti"};
   std::string destination;            ///< the node that gets the DICOM outputs; empty: none
+  int priority = 0;                   ///< each step is worth a minute of waiting
   std::optional<int> keep_days = {};  ///< after the job's end; none: as the service does, 0: for ever
   std::string label;
 };
@@ -86,6 +87,7 @@ struct JobOrder {
 struct JobPlan {
   ParameterValues parameters;     ///< resolved: flow_time_mm2, step_mm2, steps, ...
   std::int64_t memory_bytes = 0;  ///< at the peak
+  std::int64_t disk_bytes = 0;    ///< of its results, at the most
   bool is_long = false;           ///< takes more than seconds: not all places are for such jobs
 };
 
@@ -141,6 +143,7 @@ struct Job {
   JobOrder order;
   ParameterValues parameters;  ///< resolved
   std::int64_t memory_bytes = 0;
+  std::int64_t disk_bytes = 0;
   bool is_long = false;
   JobProgress progress;
   Time created_at;
@@ -173,6 +176,13 @@ struct ComputeTask {
 /// problem is the input's or the order's fault; anything thrown but `Cancelled` is ours.
 struct Engine {
   std::vector<MethodInfo> methods;
+  /// What a job of a method takes of the memory; without isovalues, and for each of them.
+  struct MethodCost {
+    std::string method;
+    std::int64_t fixed_bytes = 0;
+    double bytes_per_voxel = 0, bytes_per_voxel_and_isovalue = 0;
+  };
+  std::vector<MethodCost> costs = {};  ///< as far as known
   struct Format {
     std::string name, media_type, description;
   };

@@ -125,6 +125,7 @@ json to_json(const JobOrder& order) {
       document["source"]["preset"] = order.source->preset;
     }
   }
+  if (order.priority != 0) document["priority"] = order.priority;
   if (order.keep_days) document["keep_days"] = *order.keep_days;
   if (!order.destination.empty()) document["destination"] = order.destination;
   if (order.isovalues) document["isovalues"] = *order.isovalues;

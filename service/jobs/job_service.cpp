@@ -50,9 +50,12 @@ Tokens& JobService::tokens() {
   return state_->tokens;
 }
 
-tl::expected<IncomingFile, Problem> JobService::begin_upload(std::optional<std::int64_t> declared_bytes) {
+tl::expected<IncomingFile, Problem> JobService::begin_upload(const Caller& caller,
+                                                             std::optional<std::int64_t> declared_bytes) {
   const std::int64_t bytes = declared_bytes.value_or(0);
   if (bytes > state_->settings.max_upload_bytes) return too_large(state_->settings.max_upload_bytes);
+  if (auto within = state_->within_quota(caller, bytes); !within)
+    return tl::unexpected(std::move(within.error()));
   if (auto file = state_->files.receive(bytes)) return *std::move(file);
   return refuse("insufficient-storage", "The disk has too little free space for this upload.",
                 {{"free_bytes", std::max<std::int64_t>(state_->files.available_bytes(), 0)}});
@@ -62,6 +65,9 @@ tl::expected<StoredVolume, Problem> JobService::keep_volume(const Caller& caller
                                                             const UploadOptions& options,
                                                             const std::optional<RequestKey>& key) {
   if (file.bytes() > state_->settings.max_upload_bytes) return too_large(state_->settings.max_upload_bytes);
+  // Of a body without a length only now is known how much it is.
+  if (auto within = state_->within_quota(caller, file.bytes()); !within)
+    return tl::unexpected(std::move(within.error()));
   StoredVolume volume;
   volume.sha256 = file.finish();
   volume.block_sums = file.block_sums();
@@ -159,6 +165,7 @@ tl::expected<Job, Problem> JobService::submit(const Caller& caller, const JobOrd
     auto made = state_->engine.plan(order, volume->facts);
     if (!made) return tl::unexpected(std::move(made.error()));
     plan = *std::move(made);
+    if (auto room = state_->room_for(caller, plan); !room) return tl::unexpected(std::move(room.error()));
   }
 
   Job job;
@@ -167,17 +174,20 @@ tl::expected<Job, Problem> JobService::submit(const Caller& caller, const JobOrd
   job.order = order;
   job.parameters = std::move(plan.parameters);
   job.memory_bytes = plan.memory_bytes;
+  job.disk_bytes = plan.disk_bytes;
   job.is_long = plan.is_long;
   job.progress.stage = "queued";
   job.created_at = state_->database.now();
   job.keep = order.keep_days ? std::chrono::days(*order.keep_days) : state_->settings.keep;
-  switch (
-      state_->jobs.insert(job, state_->settings.max_queued, state_->remembering(key, job.tenant, job.id))) {
+  switch (state_->jobs.insert(job, state_->queue_limits(), state_->remembering(key, job.tenant, job.id))) {
     case JobStore::Insertion::kNoVolume:
       return no_volume();
     case JobStore::Insertion::kQueueFull:
       return refuse("queue-full", "Too many jobs are waiting; try again later.",
                     {{"limit", state_->settings.max_queued}});
+    case JobStore::Insertion::kTenantQueueFull:
+      return refuse("queue-full", "Too many of your jobs are waiting; try again when some are done.",
+                    {{"limit", state_->settings.tenant_max_queued}});
     case JobStore::Insertion::kDone:
       break;
   }

@@ -33,6 +33,8 @@ struct JobServiceSettings {
   std::int64_t reserved_disk_bytes = std::int64_t{64} << 20;
   int max_deaths = 10;  ///< a job that was running at this many deaths of the daemon is failed
   int max_queued = 10'000;
+  int tenant_max_queued = 10'000;
+  std::int64_t tenant_max_bytes = 0;  ///< of a tenant's volumes and results; 0: as much as the disk holds
   std::chrono::milliseconds node_patience = std::chrono::hours(24);  ///< a node that is down is asked again
   std::chrono::milliseconds longest_node_pause = std::chrono::minutes(5);
   /// Volumes so long after their upload, jobs and results after the job's end; 0: for ever.
@@ -88,8 +90,8 @@ struct LedgerEntry {
 /// What is not the caller's tenant's answers like an unknown id; whether the caller has the scope that a call
 /// needs has been looked at before. Thread-safe; calls may block on the disk, none computes except
 /// `keep_volume`, which verifies the whole file. Problems it gives (slugs): not-found, gone, bad-id,
-/// volume-in-use, insufficient-storage, content-too-large, queue-full, not-ready, unknown-algorithm, and what
-/// the engine's `inspect` and `plan` give. Throws when the store itself fails.
+/// volume-in-use, insufficient-storage, content-too-large, queue-full, quota, not-ready, unknown-algorithm,
+/// and what the engine's `inspect` and `plan` give. Throws when the store itself fails.
 class JobService {
  public:
   /// Opens and recovers the store; throws std::runtime_error.
@@ -104,7 +106,8 @@ class JobService {
   const Engine& engine() const;
   Tokens& tokens();  ///< by which its callers are known
 
-  tl::expected<IncomingFile, Problem> begin_upload(std::optional<std::int64_t> declared_bytes);
+  tl::expected<IncomingFile, Problem> begin_upload(const Caller& caller,
+                                                   std::optional<std::int64_t> declared_bytes);
   tl::expected<StoredVolume, Problem> keep_volume(const Caller& caller, IncomingFile file,
                                                   const UploadOptions& options,
                                                   const std::optional<RequestKey>& key = {});

@@ -106,8 +106,8 @@ void insert_results(Database& database, std::string_view job_id, std::int64_t at
   }
 }
 
-std::int64_t count(Database& database, std::string_view sql) {
-  Statement row = database.query(sql);
+std::int64_t count(Database& database, std::string_view sql, const auto&... values) {
+  Statement row = database.query(sql, values...);
   row.step();
   return row.integer(0);
 }
@@ -116,12 +116,13 @@ std::int64_t count(Database& database, std::string_view sql) {
 int insert_row(Database& database, const Job& job) {
   return database.run(
       "INSERT INTO jobs (id, volume, method, label, state, job_order, parameters, memory_bytes, created_ms, "
-      "is_long, stage, tenant, keep_ms) "
-      "SELECT ?1, ?2, ?3, ?4, 'queued', ?5, ?6, ?7, ?8, ?9, 'queued', ?10, ?11 "
+      "is_long, stage, tenant, keep_ms, due_ms, disk_bytes) "
+      "SELECT ?1, ?2, ?3, ?4, 'queued', ?5, ?6, ?7, ?8, ?9, 'queued', ?10, ?11, ?12, ?13 "
       "WHERE ?2 = '' OR EXISTS (SELECT 1 FROM volumes WHERE id = ?2 AND tenant = ?10)",
       job.id, job.order.volume, job.order.method, job.order.label, to_json(job.order).dump(),
       to_json(job.parameters).dump(), job.memory_bytes, milliseconds_of(job.created_at), job.is_long,
-      job.tenant, job.keep.count());
+      job.tenant, job.keep.count(),
+      milliseconds_of(job.created_at - std::chrono::minutes(job.order.priority)), job.disk_bytes);
 }
 
 void take_retrieved(Database& database, const std::string& job_id, const Retrieved& retrieved) {
@@ -129,20 +130,22 @@ void take_retrieved(Database& database, const std::string& job_id, const Retriev
   JobOrder order = find_in(database, job_id).value().order;
   order.volume = retrieved.volume.id;
   database.run(
-      "UPDATE jobs SET volume = ?2, job_order = ?3, parameters = ?4, memory_bytes = ?5, is_long = ?6 WHERE "
-      "id = ?1",
+      "UPDATE jobs SET volume = ?2, job_order = ?3, parameters = ?4, memory_bytes = ?5, is_long = ?6, "
+      "disk_bytes = ?7 WHERE id = ?1",
       job_id, order.volume, to_json(order).dump(), to_json(retrieved.plan.parameters).dump(),
-      retrieved.plan.memory_bytes, retrieved.plan.is_long);
+      retrieved.plan.memory_bytes, retrieved.plan.is_long, retrieved.plan.disk_bytes);
 }
 
 constexpr std::string_view kCountQueued = "SELECT count(*) FROM jobs WHERE state = 'queued'";
 
 }  // namespace
 
-JobStore::Insertion JobStore::insert(const Job& job, int max_queued,
+JobStore::Insertion JobStore::insert(const Job& job, QueueLimits limits,
                                      const std::function<void(Database&)>& also) {
   return database_.write([&](Database& database) {
-    if (count(database, kCountQueued) >= max_queued) return Insertion::kQueueFull;
+    if (count(database, kCountQueued) >= limits.all) return Insertion::kQueueFull;
+    if (count(database, std::string(kCountQueued) + " AND tenant = ?", job.tenant) >= limits.of_tenant)
+      return Insertion::kTenantQueueFull;
     if (insert_row(database, job) == 0) return Insertion::kNoVolume;
     insert_event(database, job.id,
                  {events_.next(), "state", state_event_data(job.id, JobState::kQueued, {}, {})});
@@ -179,23 +182,71 @@ std::vector<JobStore::Listed> JobStore::list(std::string_view tenant, const JobQ
   });
 }
 
+std::optional<std::string> JobStore::next_tenant(Database& database, bool has_volume, std::int64_t now,
+                                                 bool long_ones) const {
+  struct Share {
+    std::int64_t running;
+    std::uint64_t served;
+    std::int64_t due;
+    auto operator<=>(const Share&) const = default;
+  };
+  std::map<std::string, std::int64_t, std::less<>> running;
+  Statement busy =
+      database.query("SELECT tenant, count(*) FROM jobs WHERE state = 'running' GROUP BY tenant");
+  while (busy.step()) running[busy.text(0)] = busy.integer(1);
+  Statement waiting = database.query(
+      "SELECT tenant, min(due_ms) FROM jobs WHERE state = 'queued' AND (volume <> '') = ? AND not_before_ms "
+      "<= ? AND is_long <= ? GROUP BY tenant",
+      has_volume, now, long_ones);
+  std::optional<std::string> next;
+  Share least{};
+  const std::lock_guard lock(serving_);
+  while (waiting.step()) {
+    const std::string tenant = waiting.text(0);
+    const auto served = served_.find(tenant);
+    const Share share{running[tenant], served == served_.end() ? 0 : served->second, waiting.integer(1)};
+    if (next && share >= least) continue;
+    next = tenant;
+    least = share;
+  }
+  return next;
+}
+
 std::optional<Job> JobStore::claim(std::int64_t most_memory_bytes, Work work, bool long_ones) {
   const bool has_volume = work == Work::kCompute;
   const std::int64_t now = milliseconds_of(database_.now());
-  const auto oldest = [&](Database& database) {
-    return database.query(
-        "SELECT id, attempt, memory_bytes FROM jobs WHERE sequence = (SELECT min(sequence) FROM jobs "
-        "WHERE state = 'queued' AND (volume <> '') = ? AND not_before_ms <= ? AND is_long <= ?)",
-        has_volume, now, long_ones);
-  };
-  if (!database_.read([&](Database& database) { return oldest(database).step(); })) return std::nullopt;
+  const auto next = [&](Database& database) { return next_tenant(database, has_volume, now, long_ones); };
+  if (!database_.read([&](Database& database) { return next(database).has_value(); })) return std::nullopt;
   return database_.write([&](Database& database) -> std::optional<Job> {
-    Statement head = oldest(database);
+    const auto tenant = next(database);
+    if (!tenant) return std::nullopt;
+    Statement head = database.query(
+        "SELECT id, attempt, memory_bytes FROM jobs WHERE state = 'queued' AND tenant = ? AND (volume <> '') "
+        "= ? "
+        "AND not_before_ms <= ? AND is_long <= ? ORDER BY due_ms, sequence LIMIT 1",
+        *tenant, has_volume, now, long_ones);
     if (!head.step() || head.integer(2) > most_memory_bytes) return std::nullopt;
     JobChange claimed{head.text(0), static_cast<int>(head.integer(1)), JobState::kQueued, JobState::kRunning,
                       JobProgress{has_volume ? "read" : "retrieve", 0, std::nullopt}};
     change_in(database, claimed);
+    const std::lock_guard lock(serving_);
+    served_[*tenant] = ++claims_;
     return find_in(database, claimed.id);
+  });
+}
+
+std::int64_t JobStore::bytes_of_tenant(std::string_view tenant) {
+  return database_.read([&](Database& database) {
+    Statement row = database.query("SELECT coalesce(sum(bytes), 0) FROM usage WHERE tenant = ?", tenant);
+    row.step();
+    return row.integer(0);
+  });
+}
+
+std::int64_t JobStore::disk_bytes_of_unfinished() {
+  return database_.read([](Database& database) {
+    return count(database,
+                 "SELECT coalesce(sum(disk_bytes), 0) FROM jobs WHERE state IN ('queued', 'running')");
   });
 }
 

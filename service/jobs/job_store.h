@@ -1,6 +1,8 @@
 #pragma once
 
 #include <functional>
+#include <map>
+#include <mutex>
 #include <optional>
 #include <set>
 #include <string>
@@ -41,10 +43,14 @@ class JobStore {
 
   EventCounter& event_counter() { return events_; }
 
-  enum class Insertion { kDone, kNoVolume, kQueueFull };
+  enum class Insertion { kDone, kNoVolume, kQueueFull, kTenantQueueFull };
+  /// How many may wait, of all tenants and of one.
+  struct QueueLimits {
+    int all, of_tenant;
+  };
   /// `also` is done in the same transaction, with the job there.
   Insertion insert(
-      const Job& job, int max_queued, const std::function<void(Database&)>& also = [](Database&) {});
+      const Job& job, QueueLimits limits, const std::function<void(Database&)>& also = [](Database&) {});
 
   std::optional<Job> find(std::string_view id);
   std::optional<Job> find(std::string_view tenant, std::string_view id);
@@ -58,8 +64,10 @@ class JobStore {
 
   /// What is to be done for a queued job: fetch its series, or compute.
   enum class Work { kRetrieve, kCompute };
-  /// The oldest queued job with that to be done becomes a running one, provided that it needs no more memory
-  /// than this. Without `long_ones`: the oldest that is not long.
+  /// The queued job with that to be done that comes next becomes a running one, provided that it needs no
+  /// more memory than this. It is that of the tenant with the fewest running jobs (of equals, the one that
+  /// was served longest ago) that is due first: a job is due when it was made, a minute earlier for each step
+  /// of priority. Without `long_ones`: the next that is not long.
   std::optional<Job> claim(std::int64_t most_memory_bytes, Work work = Work::kCompute, bool long_ones = true);
   /// False: the job is not in that state and attempt any more, or was asked to be cancelled.
   bool change(const JobChange& change);
@@ -89,13 +97,23 @@ class JobStore {
   std::set<std::string, std::less<>> results_directories();  ///< those that a succeeded job points to
 
   std::vector<NumberedEvent> events_after(std::string_view id, EventNumber after);
+  std::int64_t bytes_of_tenant(std::string_view tenant);  ///< of its volumes and results
+  std::int64_t disk_bytes_of_unfinished();                ///< that their results may come to
+
   ServiceStatistics statistics();  ///< all but the free disk space
 
  private:
   bool change_in(Database& database, const JobChange& change);
 
+  std::optional<std::string> next_tenant(Database& database, bool has_volume, std::int64_t now,
+                                         bool long_ones) const;
+
   StoreDatabase& database_;
   EventCounter events_;
+  mutable std::mutex serving_;
+  std::map<std::string, std::uint64_t, std::less<>>
+      served_;                ///< when each tenant was, in claims; by the mutex
+  std::uint64_t claims_ = 0;  ///< by the mutex
 };
 
 /// Where the results of a job lie below the data directory; each attempt has a place of its own.

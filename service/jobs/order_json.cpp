@@ -17,7 +17,7 @@ using nlohmann::json;
 using Checked = tl::expected<void, Problem>;
 
 constexpr std::size_t kMostIsovalues = 32;
-constexpr int kMostDays = 36'500;
+constexpr int kMostDays = 36'500, kHighestPriority = 60;
 constexpr std::size_t kLongestLabel = 200;
 constexpr std::array<std::string_view, 5> kOutputs = {"nifti", "dicom-series", "dicom-stl", "dicom-obj",
                                                       "dicom-surface-segmentation"};
@@ -212,12 +212,20 @@ Checked read_keep_days(const json& value, JobOrder& order) {
   return {};
 }
 
+Checked read_priority(const json& value, JobOrder& order) {
+  if (!value.is_number_integer() || value < -kHighestPriority || value > kHighestPriority)
+    return bad("priority", "a whole number from -" + std::to_string(kHighestPriority) + " to " +
+                               std::to_string(kHighestPriority) + "; each step is worth a minute of waiting");
+  order.priority = value.get<int>();
+  return {};
+}
+
 struct Member {
   std::string_view name;
   Checked (*read)(const json& value, JobOrder& order);
 };
 
-constexpr std::array<Member, 12> kMembers = {{{"volume", read_volume},
+constexpr std::array<Member, 13> kMembers = {{{"volume", read_volume},
                                               {"source", read_source},
                                               {"method", read_method},
                                               {"parameters", read_parameters},
@@ -227,6 +235,7 @@ constexpr std::array<Member, 12> kMembers = {{{"volume", read_volume},
                                               {"voxel_type", read_voxel_type},
                                               {"outputs", read_outputs},
                                               {"destination", read_destination},
+                                              {"priority", read_priority},
                                               {"keep_days", read_keep_days},
                                               {"label", read_label}}};
 

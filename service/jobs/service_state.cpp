@@ -196,7 +196,7 @@ void JobService::State::start_job_of(const Preset& preset, const ArrivalStore::Q
   job.created_at = database.now();
   job.keep = job.order.keep_days ? std::chrono::days(*job.order.keep_days) : settings.keep;
   const auto outcome =
-      jobs.insert(job, settings.max_queued, [&](Database& writer) { hand_over(writer, series, job.id); });
+      jobs.insert(job, queue_limits(), [&](Database& writer) { hand_over(writer, series, job.id); });
   if (outcome == JobStore::Insertion::kDone) {
     retrievals.wake();
   } else {
@@ -325,6 +325,27 @@ tl::expected<void, Problem> JobService::State::check(const JobOrder& order) cons
     return refuse("bad-parameter", "'keep_days' must be from 1 to " + std::to_string(days) + " here.",
                   {{"member", "keep_days"}, {"minimum", 1}, {"maximum", days}});
   return check_parameters(order.parameters, *method);
+}
+
+tl::expected<void, Problem> JobService::State::within_quota(const Caller& caller, std::int64_t more_bytes) {
+  if (settings.tenant_max_bytes == 0) return {};
+  const std::int64_t used = jobs.bytes_of_tenant(caller.tenant);
+  if (used < settings.tenant_max_bytes && more_bytes <= settings.tenant_max_bytes - used) return {};
+  return refuse(
+      "quota", "This is more than may be kept for you; delete volumes or jobs, or wait for them to expire.",
+      {{"needed_bytes", more_bytes}, {"used_bytes", used}, {"limit_bytes", settings.tenant_max_bytes}});
+}
+
+tl::expected<void, Problem> JobService::State::room_for(const Caller& caller, const JobPlan& plan) {
+  if (auto within = within_quota(caller, plan.disk_bytes); !within) return within;
+  const std::int64_t free =
+      std::max<std::int64_t>(files.available_bytes() - jobs.disk_bytes_of_unfinished(), 0);
+  if (plan.disk_bytes <= free) return {};
+  return refuse(
+      "insufficient-storage",
+      "The results of this job may not fit on the disk beside those of the jobs before it; ask for less, or "
+      "try again when some were deleted.",
+      {{"estimate_bytes", plan.disk_bytes}, {"free_bytes", free}});
 }
 
 tl::expected<StoredFile, Problem> JobService::State::stored_file(const std::string& name,

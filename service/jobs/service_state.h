@@ -68,6 +68,12 @@ struct JobService::State {
   std::function<void(Database&)> remembering(const std::optional<RequestKey>& key, const std::string& tenant,
                                              const std::string& id);
   tl::expected<void, Problem> check(const JobOrder& order) const;
+  JobStore::QueueLimits queue_limits() const { return {settings.max_queued, settings.tenant_max_queued}; }
+  /// Whether the caller's tenant may keep so much more.
+  tl::expected<void, Problem> within_quota(const Caller& caller, std::int64_t more_bytes);
+  /// Whether the results of a job fit on the disk beside those of the jobs accepted before, and into the
+  /// quota.
+  tl::expected<void, Problem> room_for(const Caller& caller, const JobPlan& plan);
   tl::expected<void, Problem> check_nodes(const JobOrder& order) const;
   tl::expected<StoredFile, Problem> stored_file(const std::string& name, const std::string& media_type,
                                                 std::int64_t bytes, const std::string& sha256);

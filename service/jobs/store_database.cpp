@@ -205,9 +205,38 @@ constexpr const char* kTokens = R"(
   ) STRICT, WITHOUT ROWID;
 )";
 
+/// Who comes next: of each tenant the job that is due first. And what each tenant keeps, counted as it comes
+/// and goes.
+constexpr const char* kShares = R"(
+  ALTER TABLE jobs ADD COLUMN due_ms INTEGER NOT NULL DEFAULT 0;
+  ALTER TABLE jobs ADD COLUMN disk_bytes INTEGER NOT NULL DEFAULT 0;
+  UPDATE jobs SET due_ms = created_ms;
+  CREATE INDEX queued_jobs ON jobs (tenant, due_ms, sequence) WHERE state = 'queued';
+
+  CREATE TABLE usage (tenant TEXT PRIMARY KEY, bytes INTEGER NOT NULL) STRICT, WITHOUT ROWID;
+  INSERT INTO usage (tenant, bytes)
+    SELECT tenant, sum(bytes) FROM (SELECT tenant, bytes FROM volumes UNION ALL
+      SELECT jobs.tenant, results.bytes FROM results JOIN jobs ON jobs.sequence = results.job) GROUP BY tenant;
+  CREATE TRIGGER volume_comes AFTER INSERT ON volumes BEGIN
+    INSERT INTO usage (tenant, bytes) VALUES (new.tenant, new.bytes)
+      ON CONFLICT (tenant) DO UPDATE SET bytes = bytes + excluded.bytes;
+  END;
+  CREATE TRIGGER volume_goes AFTER DELETE ON volumes BEGIN
+    UPDATE usage SET bytes = bytes - old.bytes WHERE tenant = old.tenant;
+  END;
+  CREATE TRIGGER result_comes AFTER INSERT ON results BEGIN
+    INSERT INTO usage (tenant, bytes) SELECT tenant, new.bytes FROM jobs WHERE sequence = new.job
+      ON CONFLICT (tenant) DO UPDATE SET bytes = bytes + excluded.bytes;
+  END;
+  CREATE TRIGGER results_go BEFORE DELETE ON jobs BEGIN
+    UPDATE usage SET bytes = bytes - (SELECT coalesce(sum(bytes), 0) FROM results WHERE job = old.sequence)
+      WHERE tenant = old.tenant;
+  END;
+)";
+
 /// What makes each version of the schema of the one before.
 constexpr std::array kVersions = {kFirstSchema, kIndexByState, kNodes, kLongJobs, kTenants,
-                                  kStoredFiles, kKeeping,      kAudit, kTokens};
+                                  kStoredFiles, kKeeping,      kAudit, kTokens,   kShares};
 /// The last version in which the audit was no chain yet.
 constexpr std::size_t kUnlinkedAudit = std::ranges::find(kVersions, kAudit) - kVersions.begin();
 constexpr std::size_t kNewestVersion = kVersions.size();

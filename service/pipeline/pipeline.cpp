@@ -6,6 +6,34 @@
 #include "service/pipeline/stages.h"
 
 namespace volsmooth {
+namespace {
+
+/// Of `plan_job`, so that both always say the same.
+Engine::MethodCost cost_of(const Method& method) {
+  constexpr std::int64_t kSide = 256;
+  constexpr double kVoxels = static_cast<double>(kSide * kSide * kSide);
+  VolumeFacts volume;
+  volume.format = "nifti-1";
+  volume.size = {kSide, kSide, kSide};
+  volume.spacing_mm = {1, 1, 1};
+  for (std::size_t axis = 0; axis < 3; ++axis) volume.affine[axis][axis] = 1;
+  volume.voxel_type = "int16";
+  volume.intensity_max = 1;
+  const auto memory = [&](const std::vector<double>& isovalues) {
+    JobOrder order;
+    order.method = method.info.name;
+    order.isovalues = isovalues;
+    for (const ParameterInfo& info : method.info.parameters)
+      if (info.required) order.parameters[info.name] = info.is_isovalue ? 0.5 : 1.0;
+    const auto plan = plan_job(order, volume, {});
+    return static_cast<double>(plan ? plan->memory_bytes : 0);
+  };
+  const double none = memory({}), one = memory({0.5});
+  return {method.info.name, kFixedBytesOfJob, (none - static_cast<double>(kFixedBytesOfJob)) / kVoxels,
+          (one - none) / kVoxels};
+}
+
+}  // namespace
 
 Engine make_engine(const PipelineLimits& limits) {
   Engine engine;
@@ -19,6 +47,7 @@ Engine make_engine(const PipelineLimits& limits) {
   engine.plan = [limits](const JobOrder& order, const VolumeFacts& volume) {
     return plan_job(order, volume, limits);
   };
+  for (const Method& method : catalog()) engine.costs.push_back(cost_of(method));
   engine.compute = [limits](const ComputeTask& task, const StageProgress& report) {
     return run_job(task, report, limits);
   };

@@ -21,4 +21,7 @@ tl::expected<std::vector<Result>, Problem> run_job(const ComputeTask& task, cons
 /// As a sentence says it: "11.6 GB".
 std::string gigabytes(std::int64_t bytes);
 
+/// What a job takes of the memory beside its voxels and surfaces.
+inline constexpr std::int64_t kFixedBytesOfJob = std::int64_t{64} << 20;
+
 }  // namespace volsmooth

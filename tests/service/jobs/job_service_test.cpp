@@ -352,7 +352,7 @@ TEST_F(JobServiceTest, UploadsHaveALimit) {
   JobServiceSettings small = settings();
   small.max_upload_bytes = 4;
   JobService service(small, fake_.engine());
-  EXPECT_EQ(slug_of(service.begin_upload(5)), "content-too-large");
+  EXPECT_EQ(slug_of(service.begin_upload(kAnyone, 5)), "content-too-large");
   EXPECT_EQ(slug_of(upload(service, "12345")), "content-too-large");
   EXPECT_EQ(slug_of(upload(service, "1234")), "none");
 }
@@ -363,25 +363,25 @@ TEST_F(JobServiceTest, UploadsAtTheSameTimeShareTheDisk) {
   JobService service(large, fake_.engine());
   const std::int64_t most = service.statistics().free_disk_bytes / 10 * 6;
   {
-    const auto first = service.begin_upload(most);
+    const auto first = service.begin_upload(kAnyone, most);
     EXPECT_EQ(slug_of(first), "none");
-    EXPECT_EQ(slug_of(service.begin_upload(most)), "insufficient-storage");
+    EXPECT_EQ(slug_of(service.begin_upload(kAnyone, most)), "insufficient-storage");
   }
-  EXPECT_EQ(slug_of(service.begin_upload(most)), "none");
+  EXPECT_EQ(slug_of(service.begin_upload(kAnyone, most)), "none");
 }
 
 TEST_F(JobServiceTest, AnUploadOfUnknownLengthLeavesTheReserve) {
   JobServiceSettings full = settings();
   full.reserved_disk_bytes = std::int64_t{1} << 60;
   JobService service(full, fake_.engine());
-  EXPECT_EQ(slug_of(service.begin_upload({})), "insufficient-storage");
+  EXPECT_EQ(slug_of(service.begin_upload(kAnyone, {})), "insufficient-storage");
 }
 
 TEST_F(JobServiceTest, AnUploadLargerThanTheDiskIsRefused) {
   JobServiceSettings large = settings();
   large.max_upload_bytes = std::numeric_limits<std::int64_t>::max();
   JobService service(large, fake_.engine());
-  EXPECT_EQ(slug_of(service.begin_upload(std::int64_t{1} << 60)), "insufficient-storage");
+  EXPECT_EQ(slug_of(service.begin_upload(kAnyone, std::int64_t{1} << 60)), "insufficient-storage");
 }
 
 /// As long as it lives, no file of this process can grow beyond a page, so writing to the database fails in a

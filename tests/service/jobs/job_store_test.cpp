@@ -31,7 +31,7 @@ class JobStoreTest : public testing::Test {
     job.id = id;
     job.order.volume = "v-1";
     job.memory_bytes = memory_bytes;
-    EXPECT_EQ(jobs_.insert(job, 1000), JobStore::Insertion::kDone);
+    EXPECT_EQ(jobs_.insert(job, {1000, 1000}), JobStore::Insertion::kDone);
     return job;
   }
 
@@ -87,7 +87,7 @@ TEST_F(JobStoreTest, WithoutLongOnesTheOldestOfTheOthersIsClaimed) {
   lasting.id = "j-1";
   lasting.order.volume = "v-1";
   lasting.is_long = true;
-  ASSERT_EQ(jobs_.insert(lasting, 1000), JobStore::Insertion::kDone);
+  ASSERT_EQ(jobs_.insert(lasting, {1000, 1000}), JobStore::Insertion::kDone);
   add("j-2");
   EXPECT_EQ(jobs_.claim(1, JobStore::Work::kCompute, false)->id, "j-2");
   EXPECT_FALSE(jobs_.claim(1, JobStore::Work::kCompute, false));
@@ -112,10 +112,21 @@ TEST_F(JobStoreTest, TheQueueHasAnEnd) {
   Job second;
   second.id = "j-2";
   second.order.volume = "v-1";
-  EXPECT_EQ(jobs_.insert(second, 1), JobStore::Insertion::kQueueFull);
+  EXPECT_EQ(jobs_.insert(second, {1, 9}), JobStore::Insertion::kQueueFull);
   second.order.volume = "v-2";
-  EXPECT_EQ(jobs_.insert(second, 2), JobStore::Insertion::kNoVolume);
+  EXPECT_EQ(jobs_.insert(second, {2, 9}), JobStore::Insertion::kNoVolume);
   EXPECT_FALSE(jobs_.find("j-2"));
+}
+
+TEST_F(JobStoreTest, TheQueueOfATenantHasAnEndOfItsOwn) {
+  add("j-1");
+  Job second;
+  second.id = "j-2";
+  second.order.source.emplace();
+  second.tenant = "other";
+  EXPECT_EQ(jobs_.insert(second, {9, 1}), JobStore::Insertion::kDone);
+  second.id = "j-3";
+  EXPECT_EQ(jobs_.insert(second, {9, 1}), JobStore::Insertion::kTenantQueueFull);
 }
 
 TEST_F(JobStoreTest, AVolumeStaysWhileAJobNeedsIt) {

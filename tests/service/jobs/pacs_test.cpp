@@ -361,7 +361,7 @@ class PresetJobs : public JobServiceTest {
   }
 
   auto send(const std::string& text, const std::string& preset = "head") {
-    auto file = service_->begin_upload({}).value();
+    auto file = service_->begin_upload(kAnyone, {}).value();
     file.write(std::as_bytes(std::span(text)));
     return service_->receive(kAnyone, preset, std::move(file));
   }

@@ -73,7 +73,7 @@ TEST_F(RequestKeysTest, AreNotKeptAsTheyWereSent) {
 class RepeatedRequestTest : public JobServiceTest {
  protected:
   tl::expected<StoredVolume, Problem> upload_with(const RequestKey& key) {
-    auto file = service_->begin_upload({});
+    auto file = service_->begin_upload(kAnyone, {});
     file->write(std::as_bytes(std::span("voxels")));
     return service_->keep_volume(kAnyone, *std::move(file), {}, key);
   }

@@ -32,7 +32,7 @@ struct FakeEngine {
   std::condition_variable changed;
   bool gate_open = false;
   std::atomic<int> computing = 0, most_computing = 0, computed = 0, at_gate = 0;
-  std::atomic<std::int64_t> memory_bytes = 1;
+  std::atomic<std::int64_t> memory_bytes = 1, disk_bytes = 0;
 
   void open_gate() {
     const std::lock_guard lock(mutex);
@@ -106,7 +106,7 @@ struct FakeEngine {
     };
     engine.plan = [this](const JobOrder& order, const VolumeFacts&) -> tl::expected<JobPlan, Problem> {
       if (order.label == "plan at gate") wait_at_gate([](std::string_view, double) {});
-      return JobPlan{order.parameters, memory_bytes, order.label == "gate"};
+      return JobPlan{order.parameters, memory_bytes, disk_bytes, order.label == "gate"};
     };
     engine.compute = [this](const ComputeTask& task, const StageProgress& report) {
       return compute(task, report);
@@ -121,7 +121,7 @@ std::string slug_of(const auto& answer) {
 
 /// Puts a volume of these bytes into a service.
 inline tl::expected<StoredVolume, Problem> upload(JobService& service, const std::string& bytes) {
-  auto file = service.begin_upload({});
+  auto file = service.begin_upload(kAnyone, {});
   if (!file) return tl::unexpected(file.error());
   file->write(std::as_bytes(std::span(bytes)));
   return service.keep_volume(kAnyone, *std::move(file), {});

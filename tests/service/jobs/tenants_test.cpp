@@ -35,7 +35,7 @@ class TenantsTest : public JobServiceTest {
   TenantsTest() { open_and_start(); }
 
   StoredVolume upload_as(const Caller& caller, const std::string& bytes = "x") {
-    auto file = service_->begin_upload({}).value();
+    auto file = service_->begin_upload(kAnyone, {}).value();
     file.write(std::as_bytes(std::span(bytes)));
     return service_->keep_volume(caller, std::move(file), {}).value();
   }
@@ -116,7 +116,7 @@ TEST_F(TenantsTest, WhatDevicesSendBelongsToTheirTenant) {
   service_ = std::make_unique<JobService>(settings(), engine, pacs);
   service_->start();
   for (const Caller& caller : {kAlice, kBob}) {
-    auto file = service_->begin_upload({}).value();
+    auto file = service_->begin_upload(kAnyone, {}).value();
     file.write(std::as_bytes(std::span(caller.tenant)));
     ASSERT_TRUE(service_->receive(caller, "head", std::move(file)));
   }
