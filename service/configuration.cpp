@@ -1,5 +1,16 @@
 #include "service/configuration.h"
 
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <numeric>
+#include <stdexcept>
+#include <utility>
+
 namespace volsmooth {
 namespace {
 
@@ -12,7 +23,94 @@ std::string text_of(const std::string& name, const json& value) {
                          "' must be a text, a number, true, false, or a list of these");
 }
 
+/// Levenshtein's distance: how many characters to change, add or leave out.
+std::size_t edits_between(const std::string& a, const std::string& b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t diagonal = std::exchange(row[0], i + 1);
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::size_t changed = diagonal + (a[i] == b[j] ? 0 : 1);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({changed, row[j] + 1, diagonal + 1});
+    }
+  }
+  return row.back();
+}
+
+/// Options of a command line only.
+constexpr std::array<std::string_view, 4> kNotOfAFile = {"help", "version", "config", "print-config"};
+
+/// A number or a truth as such, anything else as text.
+json value_from(const std::string& text) {
+  const json value = json::parse(text, nullptr, false);
+  return value.is_number() || value.is_boolean() ? value : json(text);
+}
+
 }  // namespace
+
+std::string nearest_match(const std::string& name, const std::vector<std::string>& names) {
+  const auto edits = [&](const std::string& other) { return edits_between(name, other); };
+  const auto nearest = std::ranges::min_element(names, {}, edits);
+  return nearest != names.end() && edits(*nearest) <= 1 + name.size() / 3 ? *nearest : std::string();
+}
+
+std::vector<std::string> JsonConfiguration::members() const {
+  std::vector<std::string> names{"nodes", "presets"};
+  for (const CLI::Option* option : app_.get_options())
+    if (const std::string name = option->get_single_name(); std::ranges::count(kNotOfAFile, name) == 0)
+      names.push_back(name);
+  return names;
+}
+
+std::string JsonConfiguration::to_config(const CLI::App*, bool, bool, std::string) const {
+  json document = *of_dicom_;
+  for (const std::string& name : members()) {
+    if (of_dicom_->contains(name)) continue;
+    const CLI::Option* option = app_.get_option("--" + name);
+    if (option->get_items_expected_max() > 1) {
+      document[name] = option->results();
+    } else if (option->count() > 0) {
+      document[name] = value_from(option->results().back());
+    } else if (!option->get_default_str().empty()) {
+      document[name] = value_from(option->get_default_str());
+    } else if (option->get_items_expected_max() == 0) {
+      document[name] = false;
+    }
+  }
+  return document.dump(2);
+}
+
+void read_environment_files(const CLI::App& app) {
+  for (const CLI::Option* option : app.get_options()) {
+    const std::string variable = option->get_envname();
+    const char* const file = variable.empty() ? nullptr : std::getenv((variable + "_FILE").c_str());
+    if (file == nullptr || std::getenv(variable.c_str()) != nullptr) continue;
+    std::ifstream in(file);
+    std::string line;
+    if (!std::getline(in, line))
+      throw std::runtime_error(variable + "_FILE names a file that cannot be read");
+    ::setenv(variable.c_str(), line.c_str(), 1);
+  }
+}
+
+std::vector<std::string> unknown_variables(const CLI::App& app) {
+  constexpr std::string_view kPrefix = "VOLSMOOTH_";
+  std::vector<std::string> known{"VOLSMOOTH_SERVER", "VOLSMOOTH_TOKEN",
+                                 "VOLSMOOTH_CA_FILE"};  // of the client
+  for (const CLI::Option* option : app.get_options())
+    if (!option->get_envname().empty()) known.push_back(option->get_envname());
+  std::vector<std::string> unknown;
+  for (char** entry = environ; *entry != nullptr; ++entry) {
+    std::string name(*entry, std::strcspn(*entry, "="));
+    const std::string bare = name.ends_with("_FILE") ? name.substr(0, name.size() - 5) : name;
+    if (!name.starts_with(kPrefix) || std::ranges::count(known, name) + std::ranges::count(known, bare) > 0)
+      continue;
+    const std::string nearest = nearest_match(name, known);
+    unknown.push_back(nearest.empty() ? name : name + " (did you mean " + nearest + "?)");
+  }
+  return unknown;
+}
 
 std::vector<CLI::ConfigItem> JsonConfiguration::from_config(std::istream& input) const {
   const json document = json::parse(input, nullptr, false);
@@ -24,6 +122,12 @@ std::vector<CLI::ConfigItem> JsonConfiguration::from_config(std::istream& input)
     if (of_dicom_->contains(name)) {
       (*of_dicom_)[name] = value;
       continue;
+    }
+    const auto known = members();
+    if (std::ranges::count(known, name) == 0) {
+      const std::string nearest = nearest_match(name, known);
+      throw CLI::ConfigError("the configuration has a member that is not known: '" + name + "'" +
+                             (nearest.empty() ? "" : "; did you mean '" + nearest + "'?"));
     }
     CLI::ConfigItem item;
     item.name = name;

@@ -15,6 +15,7 @@
 #include <stdexcept>
 
 #include "service/audit_commands.h"
+#include "service/backup_commands.h"
 #include "service/commands.h"
 #include "service/configuration.h"
 #include "service/control/control_socket.h"
@@ -28,6 +29,7 @@
 #include "service/pacs/pacs.h"
 #include "service/pacs/presets.h"
 #include "service/pipeline/pipeline.h"
+#include "service/stage_times.h"
 
 namespace volsmooth {
 namespace {
@@ -41,6 +43,7 @@ struct Options {
   std::string dimse_listen;
   std::string log_level = "info";
   bool ephemeral = false;
+  bool print_configuration = false;
   int keep_days = 7;
   int scrub_days = 7;
   bool require_tokens = false;
@@ -130,6 +133,8 @@ void declare(CLI::App& app, Options& options) {
   app.add_flag("--require-tokens", options.require_tokens,
                "Callers need a token even before there is one (volsmoothd token create)")
       ->envname("VOLSMOOTH_REQUIRE_TOKENS");
+  app.add_flag("--print-config", options.print_configuration,
+               "Prints the configuration that is in force, as a configuration file would say it, and ends");
   app.add_flag("--ephemeral", options.ephemeral,
                "Removes the data folder at the end; it must be new or empty")
       ->envname("VOLSMOOTH_EPHEMERAL");
@@ -213,8 +218,11 @@ void serve(const Options& options) {
 
   Metrics metrics;
   JobService jobs(options.jobs,
-                  make_engine({.max_memory_bytes = options.jobs.memory_limit_bytes,
-                               .ingest_program = options.ingest_program}),
+                  with_stage_times(make_engine({.max_memory_bytes = options.jobs.memory_limit_bytes,
+                                                .ingest_program = options.ingest_program}),
+                                   [&metrics](std::string_view stage, double seconds) {
+                                     metrics.stage_done(stage, seconds);
+                                   }),
                   make_pacs(options.nodes, options.presets, options.jobs.max_upload_bytes));
   jobs.on_final([&metrics](const Job& job) {
     metrics.job_done(job);
@@ -261,10 +269,12 @@ int run(int argc, char** argv) {
   CLI::App app("Smooths medical volumes; an HTTP service. GET /openapi.json describes it.", "volsmoothd");
   declare(app, options);
   const AuditCommands audit(app);
+  const BackupCommands backup(app);
   const Commands commands(app);
-  const auto configuration = std::make_shared<JsonConfiguration>();
+  const auto configuration = std::make_shared<JsonConfiguration>(app);
   app.config_formatter(configuration);
   try {
+    read_environment_files(app);
     app.parse(argc, argv);
     options.nodes = nodes_from(configuration->nodes());
     options.presets = presets_from(configuration->presets());
@@ -274,6 +284,11 @@ int run(int argc, char** argv) {
     std::cerr << "volsmoothd: " << error.what() << '\n';
     return kUsageError;
   }
+  if (options.print_configuration) {
+    std::cout << configuration->to_config(&app, true, false, {}) << '\n';
+    return 0;
+  }
+  if (backup.asked()) return guarded([&] { return backup.run(options.jobs.data_dir); });
   if (audit.asked()) return guarded([&] { return audit.run(options.jobs.data_dir); });
   if (commands.asked()) return guarded([&] { return commands.run(options.jobs.data_dir); });
   options.server.max_upload_bytes = options.jobs.max_upload_bytes;
@@ -289,6 +304,8 @@ int run(int argc, char** argv) {
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   ::signal(SIGPIPE, SIG_IGN);
   start_log(options.log_level);
+  for (const std::string& variable : unknown_variables(app))
+    log_event("unknown-variable", "nothing here goes by the environment's " + variable);
   try {
     serve(options);
     return 0;

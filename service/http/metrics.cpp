@@ -15,6 +15,7 @@ using prometheus::Gauge;
 using prometheus::Histogram;
 
 const Histogram::BucketBoundaries kRequestSeconds = {0.001, 0.005, 0.02, 0.1, 0.5, 2, 10, 60};
+const Histogram::BucketBoundaries kStageSeconds = {0.01, 0.05, 0.1, 0.5, 1, 2, 5, 10, 30, 60, 300, 1800};
 const Histogram::BucketBoundaries kJobSeconds = {0.1, 0.5, 1, 2, 5, 10, 30, 60, 300, 1800, 7200};
 
 template <typename Metric>
@@ -38,6 +39,13 @@ struct Metrics::State {
   Family<Histogram>& job_seconds =
       family<Histogram>(registry, prometheus::BuildHistogram, "volsmooth_job_seconds",
                         "From the start of a job to its final state.");
+  Histogram& wait_seconds =
+      family<Histogram>(registry, prometheus::BuildHistogram, "volsmooth_job_wait_seconds",
+                        "From the submission of a job to its last start.")
+          .Add({}, kJobSeconds);
+  Family<Histogram>& stage_seconds =
+      family<Histogram>(registry, prometheus::BuildHistogram, "volsmooth_stage_seconds",
+                        "Each stage of the jobs that ran to their end, and the verification of uploads.");
   Family<Gauge>& gauges(const char* name, const char* description) {
     return family<Gauge>(registry, prometheus::BuildGauge, name, description);
   }
@@ -68,6 +76,12 @@ void Metrics::job_done(const Job& job) {
   if (!job.started_at || !job.finished_at) return;
   const std::chrono::duration<double> taken = *job.finished_at - *job.started_at;
   state_->job_seconds.Add({{"state", state}}, kJobSeconds).Observe(taken.count());
+  const std::chrono::duration<double> waited = *job.started_at - job.created_at;
+  state_->wait_seconds.Observe(waited.count());
+}
+
+void Metrics::stage_done(std::string_view stage, double seconds) {
+  state_->stage_seconds.Add({{"stage", std::string(stage)}}, kStageSeconds).Observe(seconds);
 }
 
 std::shared_ptr<void> Metrics::upload_begins() {

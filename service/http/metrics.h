@@ -17,6 +17,8 @@ class Metrics {
   /// `route` is the pattern, or empty when none matched.
   void request_done(std::string_view method, std::string_view route, int status, double seconds);
   void job_done(const Job& job);
+  /// Of a job, such as "flow"; or "verify", of an upload.
+  void stage_done(std::string_view stage, double seconds);
 
   /// Counts an upload as being received as long as the handle lives.
   std::shared_ptr<void> upload_begins();

@@ -325,6 +325,7 @@ std::optional<std::string> JobService::not_ready_because() {
   if (state_->database.condemned()) return "a commit failed; restart the daemon to recover";
   if (!state_->started) return "starting";
   if (state_->stopping) return "stopping";
+  if (state_->files.available_bytes() < 0) return "the disk is full";
   return std::nullopt;
 }
 

@@ -122,7 +122,7 @@ TEST_F(JobStoreTest, TheQueueOfATenantHasAnEndOfItsOwn) {
   add("j-1");
   Job second;
   second.id = "j-2";
-  second.order.source.emplace();
+  second.order.source = DicomSource{"pacs", "1.2", "1.3"};
   second.tenant = "other";
   EXPECT_EQ(jobs_.insert(second, {9, 1}), JobStore::Insertion::kDone);
   second.id = "j-3";
@@ -294,6 +294,10 @@ TEST(StoreDatabase, TakesOverWhatAnEarlierVersionWrote) {
   {
     Database as_it_was(file, Database::Access::kWriter);
     as_it_was.execute(
+        "DROP TRIGGER volume_comes; DROP TRIGGER volume_goes; DROP TRIGGER result_comes; DROP TRIGGER "
+        "results_go; DROP TABLE usage; DROP INDEX queued_jobs; ALTER TABLE jobs DROP COLUMN due_ms; ALTER "
+        "TABLE "
+        "jobs DROP COLUMN disk_bytes; "
         "DROP INDEX jobs_by_state; CREATE INDEX unfinished_jobs ON jobs (state, sequence) "
         "WHERE state IN ('queued', 'running'); DROP TABLE delivered_instances; DROP TABLE deliveries; DROP "
         "TABLE arrivals; "

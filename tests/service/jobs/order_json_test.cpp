@@ -58,7 +58,6 @@ const OrderRow kRefused[] = {
     {"tenant", with(R"("tenant": "x")"), "unknown-field", "tenant"},
     {"state", with(R"("state": "succeeded")"), "unknown-field", "state"},
     {"is_admin", with(R"("is_admin": true)"), "unknown-field", "is_admin"},
-    {"priority", with(R"("priority": 1000000000)"), "unknown-field", "priority"},
     {"steps", with(R"("steps": 5)"), "unknown-field", "steps"},
     {"iterations", parameters(R"("iterations": 5)"), "unknown-field", "iterations"},
     {"step_size", parameters(R"("step_mm2": 0.1)"), "unknown-field", "step_mm2"},

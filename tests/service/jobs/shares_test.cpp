@@ -18,7 +18,7 @@ class SharesTest : public testing::Test {
     Job job;
     job.id = id;
     job.tenant = tenant;
-    job.order.source.emplace();  // so that it needs no volume
+    job.order.source = DicomSource{"pacs", "1.2", "1.3"};  // so that it needs no volume
     job.order.priority = priority;
     job.created_at = Time(std::chrono::hours(1'000)) + std::chrono::minutes(minute);
     EXPECT_EQ(jobs_.insert(job, {1000, 1000}), JobStore::Insertion::kDone);

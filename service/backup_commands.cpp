@@ -1,0 +1,136 @@
+#include "service/backup_commands.h"
+
+#include <fcntl.h>
+
+#include <iostream>
+#include <set>
+#include <stdexcept>
+
+#include "service/jobs/audit_seal.h"
+#include "service/jobs/store_database.h"
+#include "service/storage/digest.h"
+
+namespace volsmooth {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kDatabase = "volsmooth.db";
+
+struct StoredName {
+  std::string name, sha256;
+};
+
+void make_empty_folder(const fs::path& folder) {
+  if (fs::exists(folder) && !fs::is_empty(folder))
+    throw std::runtime_error(folder.string() + " is not empty; give a folder that is new or empty");
+  fs::create_directories(folder);
+  fs::permissions(folder, fs::perms::owner_all);
+}
+
+/// One state of the database, whatever is written to it meanwhile.
+void copy_database(const fs::path& from, const fs::path& to) {
+  if (!fs::exists(from)) throw std::runtime_error("there is no database in " + from.parent_path().string());
+  Database source(from, Database::Access::kReader);
+  source.execute("PRAGMA query_only = OFF");  // the connection itself cannot write to the source
+  source.query("VACUUM INTO ?", to.string()).step();
+}
+
+/// False: it is not what was stored.
+bool copy_file_durably(const fs::path& from, const fs::path& to, const std::string& sha256) {
+  fs::create_directories(to.parent_path());
+  fs::copy_file(from, to);
+  sync_path(to);
+  return sha256.empty() || digest_of(to).sha256 == sha256;
+}
+
+/// Takes out what was deleted after the database was copied and before its file was.
+void forget(Database& database, const std::string& name) {
+  const fs::path path(name);
+  const std::string folder = path.begin()->string(), entry = std::next(path.begin())->string();
+  const auto now = milliseconds_of(now_in_milliseconds());
+  const auto bury = [&](const std::string& table, const std::string& id) {
+    database.run("INSERT OR IGNORE INTO tombstones (id, deleted_ms, tenant) SELECT id, ?, tenant FROM " +
+                     table + " WHERE id = ?",
+                 now, id);
+    database.run("DELETE FROM " + table + " WHERE id = ?", id);
+  };
+  if (folder == "volumes") {
+    for (const auto& job :
+         all_of(database.query("SELECT id FROM jobs WHERE volume = ? AND state IN ('queued', "
+                               "'running')",
+                               entry),
+                [](const Statement& row) { return row.text(0); }))
+      bury("jobs", job);
+    bury("volumes", entry);
+  } else if (folder == "results") {
+    bury("jobs", entry.substr(0, entry.rfind('.')));
+  } else {
+    database.run("DELETE FROM arrivals WHERE file = ?", name);
+  }
+  database.run("DELETE FROM stored_files WHERE name = ?", name);
+}
+
+struct Copied {
+  std::int64_t files = 0, deleted = 0;
+  std::vector<std::string> damaged;
+};
+
+Copied copy_store(const fs::path& from, const fs::path& to) {
+  if (fs::exists(to) && fs::equivalent(from, to)) throw std::runtime_error("both are the same folder");
+  make_empty_folder(to);
+  copy_database(from / kDatabase, to / kDatabase);
+  Copied copied;
+  {
+    Database database(to / kDatabase, Database::Access::kWriter);
+    const auto names = all_of(database.query("SELECT name, sha256 FROM stored_files ORDER BY name"),
+                              [](const Statement& row) {
+                                return StoredName{row.text(0), row.text(1)};
+                              });
+    std::set<fs::path> folders{to};
+    for (const auto& [name, sha256] : names) {
+      try {
+        if (!copy_file_durably(from / name, to / name, sha256)) copied.damaged.push_back(name);
+        ++copied.files;
+        for (fs::path folder = (to / name).parent_path(); folder != to; folder = folder.parent_path())
+          folders.insert(folder);
+      } catch (const fs::filesystem_error& error) {
+        if (error.code() != std::errc::no_such_file_or_directory) throw;
+        Transaction transaction(database, Transaction::Kind::kWrite);
+        forget(database, name);
+        transaction.commit();
+        ++copied.deleted;
+      }
+    }
+    AuditSeal(to / kDatabase).write(audit_head(database));
+    for (const fs::path& folder : folders) sync_path(folder);
+  }
+  sync_path(to);
+  return copied;
+}
+
+}  // namespace
+
+BackupCommands::BackupCommands(CLI::App& app)
+    : backup_(app.add_subcommand("backup", "Copies all that the data folder keeps; the daemon may run")),
+      restore_(app.add_subcommand("restore", "Makes a data folder of a backup")) {
+  for (CLI::App* command : {backup_, restore_}) command->fallthrough();
+  backup_->add_option("--to", to_, "A new or empty folder")->required();
+  restore_->add_option("--from", from_, "The folder of the backup")->required();
+}
+
+bool BackupCommands::asked() const {
+  return backup_->parsed() || restore_->parsed();
+}
+
+int BackupCommands::run(const fs::path& data_dir) const {
+  const Copied copied = backup_->parsed() ? copy_store(data_dir, to_) : copy_store(from_, data_dir);
+  std::cout << copied.files << " files copied";
+  if (copied.deleted > 0) std::cout << ", " << copied.deleted << " were deleted meanwhile";
+  std::cout << '\n';
+  for (const std::string& name : copied.damaged)
+    std::cerr << "volsmoothd: " << name << " is not what was stored\n";
+  return copied.damaged.empty() ? 0 : 1;
+}
+
+}  // namespace volsmooth

@@ -1,0 +1,170 @@
+// What an operator does: configure, look, back up, restore.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <map>
+
+#include "tests/system/nifti_bytes.h"
+#include "tests/system/service_client.h"
+
+namespace volsmooth::test {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+using testing::Not;
+
+class OperatingTest : public testing::Test {
+ protected:
+  struct Outcome {
+    int exit_code;
+    std::string output, errors;
+  };
+  Outcome run(const std::vector<std::string>& options, const std::vector<std::string>& environment = {}) {
+    std::vector<std::string> command{"/usr/bin/env"};
+    command.insert(command.end(), environment.begin(), environment.end());
+    command.emplace_back(VOLSMOOTHD);
+    command.insert(command.end(), options.begin(), options.end());
+    const fs::path output = folder_ / (std::to_string(++runs_) + ".out"), errors = output.string() + ".err";
+    const int exit_code = ChildProcess(command, output, errors).wait();
+    return {exit_code, content_of(output), content_of(errors)};
+  }
+  std::string file_with(const std::string& text) {
+    const fs::path file = folder_ / (std::to_string(++runs_) + ".json");
+    std::ofstream(file) << text;
+    return file;
+  }
+
+  TemporaryDirectory folder_;
+  int runs_ = 0;
+};
+
+TEST_F(OperatingTest, AMemberThatIsASlipOfThePenIsNamedWithWhatWasMeant) {
+  for (const auto& [member, meant] : std::map<std::string, std::string>{
+           {"lisen", "listen"}, {"keep_days", "keep-days"}, {"Workers", "workers"}, {"node", "nodes"}}) {
+    const auto refused = run({"--data", folder_ / "data", "--config", file_with(json{{member, "1"}}.dump())});
+    EXPECT_EQ(refused.exit_code, 2);
+    EXPECT_THAT(refused.errors, HasSubstr("'" + member + "'; did you mean '" + meant + "'?"));
+  }
+  const auto strange = run({"--data", folder_ / "data", "--config", file_with(R"({"xylophone": 1})")});
+  EXPECT_EQ(strange.exit_code, 2);
+  EXPECT_THAT(strange.errors, Not(HasSubstr("did you mean")));
+}
+
+TEST_F(OperatingTest, PrintsTheConfigurationSoThatItCanBeUsedAsOne) {
+  const json given{{"workers", 5},
+                   {"host-name", {"one", "two"}},
+                   {"nodes", {{"pacs", {{"dicomweb", "http://127.0.0.1:1/dicom-web"}}}}}};
+  const auto printed =
+      run({"--data", "/d", "--config", file_with(given.dump()), "--memory", "2GB", "--print-config"},
+          {"VOLSMOOTH_KEEP_DAYS=3"});
+  ASSERT_EQ(printed.exit_code, 0) << printed.errors;
+  const json in_force = json::parse(printed.output);
+  EXPECT_EQ(in_force.at("workers"), 5);
+  EXPECT_EQ(in_force.at("host-name"), json({"one", "two"}));
+  EXPECT_EQ(in_force.at("keep-days"), 3);
+  EXPECT_EQ(in_force.at("listen"), "127.0.0.1:8742");
+  EXPECT_EQ(in_force.at("nodes"), given.at("nodes"));
+  const auto again = run({"--config", file_with(printed.output), "--print-config"});
+  ASSERT_EQ(again.exit_code, 0) << again.errors;
+  EXPECT_EQ(json::parse(again.output), in_force);
+}
+
+TEST_F(OperatingTest, AVariableMayNameAFileThatHoldsTheValue) {
+  const std::string file = file_with("11\n");
+  const auto read = run({"--data", "/d", "--print-config"}, {"VOLSMOOTH_WORKERS_FILE=" + file});
+  EXPECT_EQ(json::parse(read.output).at("workers"), 11);
+  const auto both =
+      run({"--data", "/d", "--print-config"}, {"VOLSMOOTH_WORKERS=2", "VOLSMOOTH_WORKERS_FILE=" + file});
+  EXPECT_EQ(json::parse(both.output).at("workers"), 2);
+  const auto missing = run({"--data", "/d", "--print-config"}, {"VOLSMOOTH_WORKERS_FILE=/no/such/file"});
+  EXPECT_EQ(missing.exit_code, 2);
+  EXPECT_THAT(missing.errors, HasSubstr("VOLSMOOTH_WORKERS_FILE"));
+}
+
+TEST_F(OperatingTest, MetricsHaveTheTimeOfEveryStage) {
+  Daemon daemon(VOLSMOOTHD);
+  const ServiceClient service(daemon);
+  service.run({{"volume", service.upload(ball_file(16)).at("id")}});
+  const std::string metrics = service.call("GET", "/metrics").body;
+  for (const std::string stage : {"verify", "read", "flow", "surfaces", "write"})
+    EXPECT_THAT(metrics, HasSubstr("volsmooth_stage_seconds_count{stage=\"" + stage + "\"} 1")) << stage;
+  EXPECT_THAT(metrics, HasSubstr("volsmooth_job_wait_seconds_count 1"));
+}
+
+class BackupTest : public OperatingTest {
+ protected:
+  Outcome back_up(const fs::path& to) { return run({"backup", "--data", daemon_.data(), "--to", to}); }
+
+  /// A daemon on what `bring` puts where its data is.
+  static void start_on(Daemon& daemon, const std::function<void(const fs::path& data)>& bring) {
+    ASSERT_EQ(daemon.terminate(), 0);
+    fs::remove_all(daemon.data());
+    bring(daemon.data());
+    daemon.start();
+  }
+
+  Daemon daemon_{VOLSMOOTHD};
+};
+
+TEST_F(BackupTest, WhatIsBackedUpBesideTheDaemonIsThereAfterARestore) {
+  const ServiceClient service(daemon_);
+  const std::string file = ball_file(16);
+  const std::string volume = service.upload(file).at("id");
+  const json job = service.run({{"volume", volume}});
+  const fs::path backup = folder_ / "backup";
+  const auto made = back_up(backup);
+  ASSERT_EQ(made.exit_code, 0) << made.errors;
+  EXPECT_EQ(service.run({{"volume", volume}}).at("state"), "succeeded");  // it goes on
+
+  Daemon another(VOLSMOOTHD);
+  start_on(another, [&](const fs::path& data) {
+    const auto brought = run({"restore", "--from", backup, "--data", data});
+    EXPECT_EQ(brought.exit_code, 0) << brought.errors;
+    EXPECT_EQ(run({"audit", "verify", "--data", data}).exit_code, 0);
+  });
+  const ServiceClient there(another);
+  EXPECT_EQ(there.call("GET", "/v1/volumes/" + volume + "/content").body, file);
+  EXPECT_EQ(there.job(job.at("id")), job);
+  for (const json& result : job.at("results"))
+    EXPECT_EQ(there.fetch(job.at("id"), result.at("name")), service.fetch(job.at("id"), result.at("name")));
+  EXPECT_EQ(there.get("/v1/jobs").at("jobs").size(), 1U);
+}
+
+TEST_F(BackupTest, NeverOverwritesAndNamesWhatIsDamaged) {
+  const ServiceClient service(daemon_);
+  const std::string volume = service.upload(ball_file(16)).at("id");
+  ASSERT_EQ(back_up(folder_ / "one").exit_code, 0);
+  const auto again = back_up(folder_ / "one");
+  EXPECT_EQ(again.exit_code, 1);
+  EXPECT_THAT(again.errors, HasSubstr("not empty"));
+
+  std::fstream(daemon_.data() / "volumes" / volume, std::ios::in | std::ios::out).put('x');
+  const auto damaged = back_up(folder_ / "two");
+  EXPECT_EQ(damaged.exit_code, 1);
+  EXPECT_THAT(damaged.errors, HasSubstr(volume));
+}
+
+TEST_F(BackupTest, WhatIsDeletedMeanwhileIsLeftOutWhole) {
+  const ServiceClient service(daemon_);
+  const std::string volume = service.upload(ball_file(16)).at("id"),
+                    kept = service.upload(ball_file(16)).at("id");
+  const json job = service.run({{"volume", volume}});
+  // As a deletion that comes between the database and the files leaves it.
+  fs::remove(daemon_.data() / "volumes" / volume);
+  fs::remove_all(daemon_.data() / "results");
+  fs::create_directory(daemon_.data() / "results");
+  Daemon another(VOLSMOOTHD);
+  start_on(another, [&](const fs::path& data) {
+    const auto made = back_up(data);
+    EXPECT_EQ(made.exit_code, 0) << made.errors;
+  });
+  const ServiceClient there(another);
+  EXPECT_EQ(there.call("GET", "/v1/volumes/" + volume).status, 410);
+  EXPECT_EQ(there.call("GET", "/v1/jobs/" + job.at("id").get<std::string>()).status, 410);
+  EXPECT_EQ(there.get("/v1/volumes/" + kept).at("id"), kept);
+}
+
+}  // namespace
+}  // namespace volsmooth::test
