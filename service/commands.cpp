@@ -150,6 +150,10 @@ int Commands::run(const std::filesystem::path& data_dir) const {
 std::string answer_command(JobService& jobs, const std::string& text) {
   try {
     const json request = json::parse(text);
+    if (request.at("command") == "audit exported") {
+      jobs.audit_done({"audit exported", "audit"});
+      return json::object().dump();
+    }
     if (request.at("command") != "status") return answer_about_tokens(jobs.tokens(), request).dump();
     const auto reason = jobs.not_ready_because();
     return (reason ? problem("not ready: " + *reason) : json{{"status", "ready"}}).dump();

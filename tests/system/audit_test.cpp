@@ -57,6 +57,7 @@ TEST_F(AuditCommandTest, ExportsAndVerifiesBesideTheDaemonAndWithoutIt) {
   EXPECT_EQ(rows[1].at("action"), "volume downloaded");
   EXPECT_EQ(rows[1].at("object"), volume);
   EXPECT_EQ(rows[1].at("outcome"), "done");
+  EXPECT_EQ(rows.back().at("action"), "audit exported");
   EXPECT_EQ(rows[1].at("request"), download.headers.at("x-request-id"));
 
   const std::string head = noted.output.substr(0, noted.output.size() - 1);
@@ -65,6 +66,7 @@ TEST_F(AuditCommandTest, ExportsAndVerifiesBesideTheDaemonAndWithoutIt) {
   EXPECT_EQ(audit({"verify", "--head", head}).exit_code, 0);
   daemon_.start();
   EXPECT_EQ(daemon_.terminate(), 0);
+  EXPECT_THAT(audit({"export"}).output, HasSubstr("audit exported"));
   EXPECT_EQ(audit({"verify", "--head", head}).exit_code, 0);
   EXPECT_EQ(audit({"verify", "--head", "1:" + std::string(64, '0')}).exit_code, 1);
 }
