@@ -22,7 +22,7 @@ std::string make_token(const Daemon& daemon, const std::string& tenant) {
 
 int main(int argc, char** argv) {
   const int tries = argc > 1 ? std::stoi(argv[1]) : 20'000;
-  const Daemon daemon(VOLSMOOTHD, {"--log-level", "warn"});
+  const Daemon daemon(VOLSMOOTHD);
   TwoTenants tenants(daemon, make_token(daemon, "ward-a"), make_token(daemon, "ward-b"));
   const int leaks = tenants.leaks(tries, 20261126);
   const bool untouched = tenants.is_untouched();
