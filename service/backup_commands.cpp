@@ -8,6 +8,7 @@
 
 #include "service/jobs/audit_seal.h"
 #include "service/jobs/store_database.h"
+#include "service/jobs/stored_files.h"
 #include "service/storage/digest.h"
 
 namespace volsmooth {
@@ -44,8 +45,14 @@ bool copy_file_durably(const fs::path& from, const fs::path& to, const std::stri
   return sha256.empty() || digest_of(to).sha256 == sha256;
 }
 
-/// Takes out what was deleted after the database was copied and before its file was.
-void forget(Database& database, const std::string& name) {
+/// Whether the row is still there from which the file was copied late.
+bool is_still_stored(Database& live, const std::string& name) {
+  return live.query("SELECT 1 FROM stored_files WHERE name = ?", name).step();
+}
+
+/// Takes out what was deleted after the database was copied and before its file was, whole: also its files
+/// that were copied in time.
+void forget(Database& database, const fs::path& to, const std::string& name) {
   const fs::path path(name);
   const std::string folder = path.begin()->string(), entry = std::next(path.begin())->string();
   const auto now = milliseconds_of(now_in_milliseconds());
@@ -55,6 +62,12 @@ void forget(Database& database, const std::string& name) {
                  now, id);
     database.run("DELETE FROM " + table + " WHERE id = ?", id);
   };
+  if (folder == "results") {
+    bury("jobs", entry.substr(0, entry.rfind('.')));
+    forget_files_in(database, folder + "/" + entry);
+    fs::remove_all(to / folder / entry);
+    return;
+  }
   if (folder == "volumes") {
     for (const auto& job :
          all_of(database.query("SELECT id FROM jobs WHERE volume = ? AND state IN ('queued', "
@@ -63,17 +76,15 @@ void forget(Database& database, const std::string& name) {
                 [](const Statement& row) { return row.text(0); }))
       bury("jobs", job);
     bury("volumes", entry);
-  } else if (folder == "results") {
-    bury("jobs", entry.substr(0, entry.rfind('.')));
   } else {
     database.run("DELETE FROM arrivals WHERE file = ?", name);
   }
-  database.run("DELETE FROM stored_files WHERE name = ?", name);
+  forget_file(database, name);
 }
 
 struct Copied {
   std::int64_t files = 0, deleted = 0;
-  std::vector<std::string> damaged;
+  std::vector<std::string> damaged;  ///< or missing
 };
 
 Copied copy_store(const fs::path& from, const fs::path& to) {
@@ -82,7 +93,8 @@ Copied copy_store(const fs::path& from, const fs::path& to) {
   copy_database(from / kDatabase, to / kDatabase);
   Copied copied;
   {
-    Database database(to / kDatabase, Database::Access::kWriter);
+    Database live(from / kDatabase, Database::Access::kReader),
+        database(to / kDatabase, Database::Access::kWriter);
     const auto names = all_of(database.query("SELECT name, sha256 FROM stored_files ORDER BY name"),
                               [](const Statement& row) {
                                 return StoredName{row.text(0), row.text(1)};
@@ -96,15 +108,22 @@ Copied copy_store(const fs::path& from, const fs::path& to) {
           folders.insert(folder);
       } catch (const fs::filesystem_error& error) {
         if (error.code() != std::errc::no_such_file_or_directory) throw;
+        if (is_still_stored(live, name)) {
+          copied.damaged.push_back(name);
+          continue;
+        }
         Transaction transaction(database, Transaction::Kind::kWrite);
-        forget(database, name);
+        forget(database, to, name);
         transaction.commit();
         ++copied.deleted;
       }
     }
     AuditSeal(to / kDatabase).write(audit_head(database));
-    for (const fs::path& folder : folders) sync_path(folder);
+    database.execute("PRAGMA journal_mode = DELETE");  // so that it can be read where nothing can be written
+    for (const fs::path& folder : folders)
+      if (fs::exists(folder)) sync_path(folder);
   }
+  sync_path(to / kDatabase);
   sync_path(to);
   return copied;
 }
@@ -129,7 +148,7 @@ int BackupCommands::run(const fs::path& data_dir) const {
   if (copied.deleted > 0) std::cout << ", " << copied.deleted << " were deleted meanwhile";
   std::cout << '\n';
   for (const std::string& name : copied.damaged)
-    std::cerr << "volsmoothd: " << name << " is not what was stored\n";
+    std::cerr << "volsmoothd: " << name << " is missing or not what was stored\n";
   return copied.damaged.empty() ? 0 : 1;
 }
 

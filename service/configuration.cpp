@@ -129,6 +129,9 @@ std::vector<CLI::ConfigItem> JsonConfiguration::from_config(std::istream& input)
       throw CLI::ConfigError("the configuration has a member that is not known: '" + name + "'" +
                              (nearest.empty() ? "" : "; did you mean '" + nearest + "'?"));
     }
+    // CLI11 itself would let the file come before the environment.
+    const std::string variable = app_.get_option("--" + name)->get_envname();
+    if (!variable.empty() && std::getenv(variable.c_str()) != nullptr) continue;
     CLI::ConfigItem item;
     item.name = name;
     for (const json& one : value.is_array() ? value : json::array({value}))

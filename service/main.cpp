@@ -44,6 +44,7 @@ struct Options {
   std::string log_level = "info";
   bool ephemeral = false;
   bool print_configuration = false;
+  bool allow_open_dimse = false;
   int keep_days = 7;
   int scrub_days = 7;
   bool require_tokens = false;
@@ -123,6 +124,10 @@ void declare(CLI::App& app, Options& options) {
   app.add_option("--host-name", options.server.host_names,
                  "A name by which clients address this daemon, beside localhost; repeatable")
       ->envname("VOLSMOOTH_HOST_NAME");
+  app.add_flag("--allow-open-dimse", options.allow_open_dimse,
+               "Allows --dimse-listen on addresses that others than this machine reach; DIMSE knows no "
+               "access control")
+      ->envname("VOLSMOOTH_ALLOW_OPEN_DIMSE");
   app.add_flag("--allow-open-network", options.server.allow_open_network,
                "Allows to listen on addresses that others than this machine reach, without TLS or tokens")
       ->envname("VOLSMOOTH_ALLOW_OPEN_NETWORK");
@@ -188,14 +193,15 @@ void reload_tls(Server& server) {
 void listen_for_devices(const Options& options, JobService& jobs, std::optional<DimseListener>& listener) {
   if (options.dimse_listen.empty()) return;
   Inbox inbox;
-  inbox.begin = [&jobs] { return jobs.begin_upload(Caller::anyone(), std::nullopt); };
+  inbox.begin = [&jobs] { return jobs.begin_arrival(); };
   inbox.keep = [&jobs, &options](const std::string& name, IncomingFile file) {
     const auto preset = std::ranges::find(options.presets, name, &Preset::name);
     const Caller device{preset->tenant, "", {Scope::kSubmit}};
     return jobs.receive(device, name, std::move(file));
   };
   inbox.max_bytes = options.jobs.max_upload_bytes;
-  listener.emplace(DimseListener::Settings{options.dimse_listen, options.server.allow_open_network,
+  listener.emplace(DimseListener::Settings{options.dimse_listen,
+                                           options.allow_open_dimse || options.server.allow_open_network,
                                            presets_by_title(options.presets), log_event},
                    std::move(inbox));
   log_event("dimse-ready", "listening for DICOM associations on " + listener->address());

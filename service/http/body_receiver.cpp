@@ -167,7 +167,7 @@ tl::expected<std::unique_ptr<BodyReceiver>, Problem> receiver_for(BodyKind kind,
     return unsupported(
         "The multipart types here are multipart/form-data with a boundary of 1 to 70 characters and, for a "
         "volume alone, multipart/related.");
-  auto file = rules.begin_upload(request.caller, declared);
+  auto file = rules.begin_upload(request.caller, declared, !head.header("idempotency-key").empty());
   if (!file) return tl::unexpected(file.error());
   request.file = std::move(*file);
   if (is_form)

@@ -22,8 +22,8 @@ inline constexpr std::int64_t kMaxTextBytes = std::int64_t{1} << 20;
 
 struct BodyRules {
   std::int64_t max_upload_bytes = 0;
-  std::function<tl::expected<IncomingFile, Problem>(const Caller& caller,
-                                                    std::optional<std::int64_t> declared_bytes)>
+  std::function<tl::expected<IncomingFile, Problem>(
+      const Caller& caller, std::optional<std::int64_t> declared_bytes, bool may_be_repeated)>
       begin_upload;
 };
 

@@ -139,8 +139,9 @@ struct Server::State {
   }
 
   static BodyRules body_rules(const ServerSettings& settings, Api api) {
-    return {settings.max_upload_bytes, [api](const Caller& caller, std::optional<std::int64_t> declared) {
-              return api.jobs.begin_upload(caller, declared);
+    return {settings.max_upload_bytes,
+            [api](const Caller& caller, std::optional<std::int64_t> declared, bool may_be_repeated) {
+              return api.jobs.begin_upload(caller, declared, may_be_repeated);
             }};
   }
 

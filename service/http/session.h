@@ -10,6 +10,7 @@
 #include "service/http/handlers.h"
 #include "service/http/host_check.h"
 #include "service/http/log.h"
+#include "service/http/refusal_rows.h"
 #include "service/http/routes.h"
 #include "service/http/server.h"
 #include "service/http/thread_pool.h"
@@ -29,6 +30,7 @@ struct SessionContext {
   ThreadPool& auditing;   ///< for rows of the audit; many, since those that wait together share an fsync
   ThreadPool& verifying;  ///< for handlers that were given a file: seconds
   std::shared_ptr<const TlsIdentity> tls = {};  ///< of new connections; none: they are in the clear
+  RefusalRows unknown_callers = {};             ///< of those who have no right to be known
   std::uint64_t last_request = 0;
   bool stopping = false;
 };

@@ -101,8 +101,13 @@ Session::Awaitable<void> Session::send(Exchange& exchange, Reply reply) {
 /// Audits what leaves no row of its own: bytes of files that go out, and what was refused. Bytes that cannot
 /// be audited stay here; a refusal stands.
 Session::Awaitable<Reply> Session::audited(Exchange& exchange, Reply reply) {
-  const auto entry = audit_entry(exchange.route, exchange.request, reply);
+  auto entry = audit_entry(exchange.route, exchange.request, reply);
   if (!entry) co_return reply;
+  if (entry->outcome == "unauthenticated") {
+    const auto left_out = context_.unknown_callers.admit();
+    if (!left_out) co_return reply;
+    if (*left_out > 0) entry->outcome += ", and " + std::to_string(*left_out) + " before it without a row";
+  }
   const auto recorded =
       co_await run_guarded(context_.auditing, exchange, [&]() -> tl::expected<void, Problem> {
         const ActingFor caller(actor_of(exchange));

@@ -1,5 +1,7 @@
 #include "service/jobs/arrival_store.h"
 
+#include <set>
+
 #include "service/jobs/ids.h"
 #include "service/jobs/job_store.h"
 
@@ -29,14 +31,18 @@ bool ArrivalStore::add(std::string_view tenant, std::string_view preset, const F
   });
 }
 
-std::optional<ArrivalStore::QuietSeries> ArrivalStore::quiet_since(const std::string& preset, Time since) {
-  return database_.read([&](Database& database) -> std::optional<QuietSeries> {
+std::vector<ArrivalStore::QuietSeries> ArrivalStore::quiet_since(const std::string& preset, Time since) {
+  return database_.read([&](Database& database) {
     Statement row = database.query(
         "SELECT study, series, tenant FROM arrivals WHERE preset = ? AND job IS NULL "
         "GROUP BY study, series, tenant HAVING max(received_ms) <= ? ORDER BY min(sequence)",
         preset, milliseconds_of(since));
-    if (!row.step()) return std::nullopt;
-    return QuietSeries{{"", row.text(0), row.text(1), preset}, row.text(2)};
+    std::vector<QuietSeries> oldest;
+    std::set<std::string> tenants;
+    while (row.step())
+      if (tenants.insert(row.text(2)).second)
+        oldest.push_back({{"", row.text(0), row.text(1), preset}, row.text(2)});
+    return oldest;
   });
 }
 
@@ -54,7 +60,9 @@ std::vector<ArrivedPart> ArrivalStore::parts_of(std::string_view job_id) {
 }
 
 std::vector<std::string> ArrivalStore::forget(std::string_view job_id) {
-  return database_.write([&](Database& database) { return forget_arrivals(database, job_id); });
+  auto files = database_.write([&](Database& database) { return forget_arrivals(database, job_id); });
+  if (!files.empty()) database_.deleted_something();
+  return files;
 }
 
 std::vector<std::string> ArrivalStore::files() {

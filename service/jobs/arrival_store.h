@@ -29,12 +29,12 @@ class ArrivalStore {
   bool add(std::string_view tenant, std::string_view preset, const FileRecord& file,
            const std::vector<ArrivedInstance>& instances);
 
-  /// A series of that preset of which nothing has arrived since, and whose it is.
+  /// Series of that preset of which nothing has arrived since, and whose they are: of each tenant the oldest.
   struct QuietSeries {
     DicomSource source;
     std::string tenant;
   };
-  std::optional<QuietSeries> quiet_since(const std::string& preset, Time since);
+  std::vector<QuietSeries> quiet_since(const std::string& preset, Time since);
 
   std::vector<ArrivedPart> parts_of(std::string_view job_id);
   /// `forget_arrivals`, in a transaction of its own.

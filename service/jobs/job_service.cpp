@@ -51,14 +51,18 @@ Tokens& JobService::tokens() {
 }
 
 tl::expected<IncomingFile, Problem> JobService::begin_upload(const Caller& caller,
-                                                             std::optional<std::int64_t> declared_bytes) {
+                                                             std::optional<std::int64_t> declared_bytes,
+                                                             bool may_be_repeated) {
   const std::int64_t bytes = declared_bytes.value_or(0);
   if (bytes > state_->settings.max_upload_bytes) return too_large(state_->settings.max_upload_bytes);
-  if (auto within = state_->within_quota(caller, bytes); !within)
-    return tl::unexpected(std::move(within.error()));
-  if (auto file = state_->files.receive(bytes)) return *std::move(file);
-  return refuse("insufficient-storage", "The disk has too little free space for this upload.",
-                {{"free_bytes", std::max<std::int64_t>(state_->files.available_bytes(), 0)}});
+  if (!may_be_repeated)
+    if (auto within = state_->within_quota(caller, bytes); !within)
+      return tl::unexpected(std::move(within.error()));
+  return state_->begin_file(bytes);
+}
+
+tl::expected<IncomingFile, Problem> JobService::begin_arrival() {
+  return state_->begin_file(0);
 }
 
 tl::expected<StoredVolume, Problem> JobService::keep_volume(const Caller& caller, IncomingFile file,
@@ -108,6 +112,8 @@ tl::expected<std::vector<ArrivedInstance>, Problem> JobService::receive(const Ca
   if (std::ranges::find(state_->pacs.presets, preset, &Preset::name) == state_->pacs.presets.end())
     return refuse("not-found", "The configuration has no such preset.");
   if (file.bytes() > state_->settings.max_upload_bytes) return too_large(state_->settings.max_upload_bytes);
+  if (auto within = state_->within_quota(caller, file.bytes()); !within)
+    return tl::unexpected(std::move(within.error()));
   const std::string sha256 = file.finish();
   auto instances = state_->engine.instances(file.path());
   if (!instances) return instances;

@@ -106,8 +106,12 @@ class JobService {
   const Engine& engine() const;
   Tokens& tokens();  ///< by which its callers are known
 
+  /// Of what `may_be_repeated`, and so be there already, the quota is looked at by `keep_volume` alone.
   tl::expected<IncomingFile, Problem> begin_upload(const Caller& caller,
-                                                   std::optional<std::int64_t> declared_bytes);
+                                                   std::optional<std::int64_t> declared_bytes,
+                                                   bool may_be_repeated = false);
+  /// The same for a device, of which it is not known yet to whom it sends; `receive` looks at the quota.
+  tl::expected<IncomingFile, Problem> begin_arrival();
   tl::expected<StoredVolume, Problem> keep_volume(const Caller& caller, IncomingFile file,
                                                   const UploadOptions& options,
                                                   const std::optional<RequestKey>& key = {});

@@ -1,5 +1,6 @@
 #include "service/jobs/job_store.h"
 
+#include <map>
 #include <stdexcept>
 
 #include "service/jobs/arrival_store.h"
@@ -39,15 +40,7 @@ Result result_from(const Statement& row) {
   return result;
 }
 
-std::vector<Result> results_of(Database& database, std::int64_t sequence) {
-  return all_of(
-      database.query("SELECT name, kind, method, isovalues, many_surfaces, frame, media_type, bytes, sha256 "
-                     "FROM results WHERE job = ? ORDER BY position",
-                     sequence),
-      result_from);
-}
-
-JobStore::Listed job_from(Database& database, const Statement& row) {
+JobStore::Listed job_from_row(const Statement& row) {
   Job job;
   const std::int64_t sequence = row.integer(0);
   job.id = row.text(1);
@@ -67,17 +60,38 @@ JobStore::Listed job_from(Database& database, const Statement& row) {
   job.tenant = row.text(18);
   job.keep = std::chrono::milliseconds(row.integer(19));
   job.expires_at = time_or_none(row, 20);
-  if (job.state == JobState::kSucceeded) {
-    job.results = results_of(database, sequence);
-    if (!job.order.destination.empty()) job.delivery = delivery_of(database, sequence);
-  }
   return {std::move(job), sequence};
+}
+
+/// What other tables know of them, the results by one query for all.
+void complete(Database& database, std::vector<JobStore::Listed>& jobs) {
+  std::map<std::int64_t, Job*> succeeded;
+  json sequences = json::array();
+  for (auto& [job, sequence] : jobs)
+    if (job.state == JobState::kSucceeded) {
+      succeeded[sequence] = &job;
+      sequences.push_back(sequence);
+    }
+  if (succeeded.empty()) return;
+  Statement rows = database.query(
+      "SELECT name, kind, method, isovalues, many_surfaces, frame, media_type, bytes, sha256, job "
+      "FROM results WHERE job IN (SELECT value FROM json_each(?)) ORDER BY job, position",
+      sequences.dump());
+  while (rows.step()) succeeded.at(rows.integer(9))->results.push_back(result_from(rows));
+  for (const auto& [sequence, job] : succeeded)
+    if (!job->order.destination.empty()) job->delivery = delivery_of(database, sequence);
+}
+
+Job job_from(Database& database, const Statement& row) {
+  std::vector<JobStore::Listed> job{job_from_row(row)};
+  complete(database, job);
+  return std::move(job.front().job);
 }
 
 std::optional<Job> find_in(Database& database, std::string_view id) {
   Statement row = database.query(std::string(kSelectJob) + "WHERE id = ?", id);
   if (!row.step()) return std::nullopt;
-  return job_from(database, row).job;
+  return job_from(database, row);
 }
 
 void insert_event(Database& database, std::string_view job_id, const NumberedEvent& event) {
@@ -163,7 +177,7 @@ std::optional<Job> JobStore::find(std::string_view tenant, std::string_view id) 
   return database_.read([&](Database& database) -> std::optional<Job> {
     Statement row = database.query(std::string(kSelectJob) + "WHERE id = ? AND tenant = ?", id, tenant);
     if (!row.step()) return std::nullopt;
-    return job_from(database, row).job;
+    return job_from(database, row);
   });
 }
 
@@ -173,12 +187,17 @@ std::vector<JobStore::Listed> JobStore::list(std::string_view tenant, const JobQ
     std::optional<std::string_view> state;
     if (query.state) state = name_of(*query.state);
     // A condition whose value is absent holds for every row.
-    Statement rows = database.query(std::string(kSelectJob) +
-                                        "WHERE tenant = ?6 AND (?1 IS NULL OR state = ?1) AND (?2 = '' OR "
-                                        "method = ?2) AND (?3 = '' OR label = ?3) "
-                                        "AND (?4 IS NULL OR sequence < ?4) ORDER BY sequence DESC LIMIT ?5",
-                                    state, query.method, query.label, before, query.limit + 1, tenant);
-    return all_of(std::move(rows), [&](const Statement& row) { return job_from(database, row); });
+    // Only conditions that are there, so that each finds its index.
+    std::string where = "WHERE tenant = ?6";
+    if (state) where += " AND state = ?1";
+    if (!query.method.empty()) where += " AND method = ?2";
+    if (!query.label.empty()) where += " AND label = ?3";
+    if (before) where += " AND sequence < ?4";
+    auto listed = all_of(database.query(std::string(kSelectJob) + where + " ORDER BY sequence DESC LIMIT ?5",
+                                        state, query.method, query.label, before, query.limit + 1, tenant),
+                         job_from_row);
+    complete(database, listed);
+    return listed;
   });
 }
 
@@ -237,7 +256,11 @@ std::optional<Job> JobStore::claim(std::int64_t most_memory_bytes, Work work, bo
 
 std::int64_t JobStore::bytes_of_tenant(std::string_view tenant) {
   return database_.read([&](Database& database) {
-    Statement row = database.query("SELECT coalesce(sum(bytes), 0) FROM usage WHERE tenant = ?", tenant);
+    Statement row = database.query(
+        "SELECT coalesce((SELECT bytes FROM usage WHERE tenant = ?1), 0) + "
+        "(SELECT coalesce(sum(disk_bytes), 0) FROM jobs WHERE tenant = ?1 AND state IN ('queued', "
+        "'running'))",
+        tenant);
     row.step();
     return row.integer(0);
   });
@@ -341,7 +364,7 @@ std::vector<JobStore::Interrupted> JobStore::running() {
   return database_.read([](Database& database) {
     return all_of(database.query(std::string(kSelectJob) + "WHERE state = 'running' ORDER BY sequence"),
                   [&](const Statement& row) {
-                    return Interrupted{job_from(database, row).job, static_cast<int>(row.integer(13)),
+                    return Interrupted{job_from(database, row), static_cast<int>(row.integer(13)),
                                        row.integer(14) != 0};
                   });
   });

@@ -97,8 +97,9 @@ class JobStore {
   std::set<std::string, std::less<>> results_directories();  ///< those that a succeeded job points to
 
   std::vector<NumberedEvent> events_after(std::string_view id, EventNumber after);
-  std::int64_t bytes_of_tenant(std::string_view tenant);  ///< of its volumes and results
-  std::int64_t disk_bytes_of_unfinished();                ///< that their results may come to
+  /// Of its volumes and results, and of those that its unfinished jobs may still have.
+  std::int64_t bytes_of_tenant(std::string_view tenant);
+  std::int64_t disk_bytes_of_unfinished();  ///< that their results may come to
 
   ServiceStatistics statistics();  ///< all but the free disk space
 

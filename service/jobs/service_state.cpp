@@ -177,15 +177,24 @@ void JobService::State::forget_arrivals(const Job& job) {
 
 WorkerPool::Work JobService::State::claim_arrivals() {
   if (stopping) return {};
-  for (const Preset& preset : pacs.presets) {
-    auto series = arrivals.quiet_since(preset.name, database.now() - preset.quiet);
-    if (series) return [this, &preset, series = *std::move(series)] { start_job_of(preset, series); };
-  }
-  return {};
+  struct Whole {
+    const Preset* preset;
+    ArrivalStore::QuietSeries series;
+  };
+  std::vector<Whole> whole;
+  for (const Preset& preset : pacs.presets)
+    for (auto& series : arrivals.quiet_since(preset.name, database.now() - preset.quiet))
+      whole.push_back({&preset, std::move(series)});
+  if (whole.empty()) return {};
+  return [this, whole = std::move(whole)] {
+    bool started_one = false;
+    for (const auto& [preset, series] : whole) started_one = start_job_of(*preset, series) || started_one;
+    if (!started_one) std::this_thread::sleep_for(std::chrono::seconds(1));
+  };
 }
 
 /// Its arrivals wait until the queue has room.
-void JobService::State::start_job_of(const Preset& preset, const ArrivalStore::QuietSeries& series) {
+bool JobService::State::start_job_of(const Preset& preset, const ArrivalStore::QuietSeries& series) {
   Job job;
   job.id = new_id("j-");
   job.tenant = series.tenant;
@@ -197,11 +206,9 @@ void JobService::State::start_job_of(const Preset& preset, const ArrivalStore::Q
   job.keep = job.order.keep_days ? std::chrono::days(*job.order.keep_days) : settings.keep;
   const auto outcome =
       jobs.insert(job, queue_limits(), [&](Database& writer) { hand_over(writer, series, job.id); });
-  if (outcome == JobStore::Insertion::kDone) {
-    retrievals.wake();
-  } else {
-    std::this_thread::sleep_for(std::chrono::seconds(1));
-  }
+  if (outcome != JobStore::Insertion::kDone) return false;
+  retrievals.wake();
+  return true;
 }
 
 void JobService::State::expire_job(const std::string& id) {
@@ -325,6 +332,15 @@ tl::expected<void, Problem> JobService::State::check(const JobOrder& order) cons
     return refuse("bad-parameter", "'keep_days' must be from 1 to " + std::to_string(days) + " here.",
                   {{"member", "keep_days"}, {"minimum", 1}, {"maximum", days}});
   return check_parameters(order.parameters, *method);
+}
+
+tl::expected<IncomingFile, Problem> JobService::State::begin_file(std::int64_t bytes) {
+  const std::int64_t free =
+      std::max<std::int64_t>(files.available_bytes() - jobs.disk_bytes_of_unfinished(), 0);
+  if (bytes <= free)
+    if (auto file = files.receive(bytes)) return *std::move(file);
+  return refuse("insufficient-storage", "The disk has too little free space for this upload.",
+                {{"free_bytes", free}});
 }
 
 tl::expected<void, Problem> JobService::State::within_quota(const Caller& caller, std::int64_t more_bytes) {

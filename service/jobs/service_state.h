@@ -47,8 +47,9 @@ struct JobService::State {
 
   // What devices send to presets.
   WorkerPool::Work claim_arrivals();  ///< of a series that has become whole: makes its job
-  void start_job_of(const Preset& preset, const ArrivalStore::QuietSeries& series);
-  void forget_arrivals(const Job& job);  ///< when it needs them no more
+  bool start_job_of(const Preset& preset,
+                    const ArrivalStore::QuietSeries& series);  ///< false: no room in the queue
+  void forget_arrivals(const Job& job);                        ///< when it needs them no more
 
   std::array<WorkerPool*, 6> pools() {
     return {&pool, &retrievals, &delivering, &receiving, &scrubbing, &forgetting};
@@ -69,6 +70,8 @@ struct JobService::State {
                                              const std::string& id);
   tl::expected<void, Problem> check(const JobOrder& order) const;
   JobStore::QueueLimits queue_limits() const { return {settings.max_queued, settings.tenant_max_queued}; }
+  /// A file to receive so many bytes into, on a disk that keeps room for the results of unfinished jobs.
+  tl::expected<IncomingFile, Problem> begin_file(std::int64_t bytes);
   /// Whether the caller's tenant may keep so much more.
   tl::expected<void, Problem> within_quota(const Caller& caller, std::int64_t more_bytes);
   /// Whether the results of a job fit on the disk beside those of the jobs accepted before, and into the

@@ -211,7 +211,8 @@ constexpr const char* kShares = R"(
   ALTER TABLE jobs ADD COLUMN due_ms INTEGER NOT NULL DEFAULT 0;
   ALTER TABLE jobs ADD COLUMN disk_bytes INTEGER NOT NULL DEFAULT 0;
   UPDATE jobs SET due_ms = created_ms;
-  CREATE INDEX queued_jobs ON jobs (tenant, due_ms, sequence) WHERE state = 'queued';
+  CREATE INDEX queued_jobs ON jobs (tenant, due_ms, sequence, volume, not_before_ms, is_long) WHERE state = 'queued';
+  CREATE INDEX unfinished_disk ON jobs (tenant, disk_bytes) WHERE state IN ('queued', 'running');
 
   CREATE TABLE usage (tenant TEXT PRIMARY KEY, bytes INTEGER NOT NULL) STRICT, WITHOUT ROWID;
   INSERT INTO usage (tenant, bytes)
@@ -234,9 +235,15 @@ constexpr const char* kShares = R"(
   END;
 )";
 
+constexpr const char* kLists = R"(
+  CREATE INDEX jobs_by_tenant_state ON jobs (tenant, state, sequence);
+  CREATE INDEX jobs_by_tenant_method ON jobs (tenant, method, sequence);
+  CREATE INDEX jobs_by_tenant_label ON jobs (tenant, label, sequence);
+)";
+
 /// What makes each version of the schema of the one before.
-constexpr std::array kVersions = {kFirstSchema, kIndexByState, kNodes, kLongJobs, kTenants,
-                                  kStoredFiles, kKeeping,      kAudit, kTokens,   kShares};
+constexpr std::array kVersions = {kFirstSchema, kIndexByState, kNodes,  kLongJobs, kTenants, kStoredFiles,
+                                  kKeeping,     kAudit,        kTokens, kShares,   kLists};
 /// The last version in which the audit was no chain yet.
 constexpr std::size_t kUnlinkedAudit = std::ranges::find(kVersions, kAudit) - kVersions.begin();
 constexpr std::size_t kNewestVersion = kVersions.size();
@@ -317,9 +324,12 @@ void StoreDatabase::clear_log() {
   // Most of it while others read; what is left then is a moment's work, with nobody reading.
   writer_.execute("PRAGMA wal_checkpoint(PASSIVE)");
   const std::lock_guard reading(reader_mutex_);
+  // Whoever else reads the file, such as a backup, is not waited for: everybody here would wait along.
+  writer_.execute("PRAGMA busy_timeout = 0");
   Statement outcome = writer_.query("PRAGMA wal_checkpoint(TRUNCATE)");
   outcome.step();
-  log_holds_deleted_ = outcome.integer(0) != 0;  // somebody else has the file open, such as a backup
+  log_holds_deleted_ = outcome.integer(0) != 0;
+  writer_.execute("PRAGMA busy_timeout = 5000");
 }
 
 void bury(Database& database, std::string_view id, std::string_view tenant, Burial reason, Time now) {

@@ -12,7 +12,7 @@ constexpr std::uint16_t kOtherThanAnnounced = 0xB007;  ///< a warning: it is sto
 }  // namespace
 
 std::uint16_t status_of(const Problem& problem) {
-  constexpr const char* kOfResources[] = {"insufficient-storage", "not-ready", "queue-full"};
+  constexpr const char* kOfResources[] = {"insufficient-storage", "not-ready", "queue-full", "quota"};
   const bool of_resources = std::ranges::find(kOfResources, problem.slug) != std::end(kOfResources);
   return of_resources || problem.is_passing ? kOutOfResources : kCannotUnderstand;
 }

@@ -242,6 +242,8 @@ class Proof {
                  {"isovalues", {500}}});
     if (daemon_.terminate() != 0) find("exit code");
     for (const std::string& fault : faults_of_store(daemon_.data())) find(fault);
+    if (daemon_.log().find("audit was shortened") != std::string::npos)
+      find("the audit is not what was sealed");
   }
 
   std::int64_t stride_;

@@ -12,8 +12,8 @@ namespace volsmooth {
 /// A folder for one test, gone with it.
 class ScratchFolder {
  public:
-  ScratchFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "volsmooth-test-XXXXXX").string();
+  explicit ScratchFolder(const std::filesystem::path& where = std::filesystem::temp_directory_path()) {
+    std::string name = (where / "volsmooth-test-XXXXXX").string();
     if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("no folder for the test");
     path_ = name;
   }

@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <map>
+#include <thread>
 
 #include "tests/system/nifti_bytes.h"
 #include "tests/system/service_client.h"
@@ -69,6 +70,19 @@ TEST_F(OperatingTest, PrintsTheConfigurationSoThatItCanBeUsedAsOne) {
   const auto again = run({"--config", file_with(printed.output), "--print-config"});
   ASSERT_EQ(again.exit_code, 0) << again.errors;
   EXPECT_EQ(json::parse(again.output), in_force);
+}
+
+TEST_F(OperatingTest, AnOptionComesBeforeAVariableAndThatBeforeTheFile) {
+  const std::vector<std::string> options{"--data", "/d", "--print-config", "--config",
+                                         file_with(R"({"workers": 3, "require-tokens": false, "queue": 7})")};
+  const std::vector<std::string> environment{"VOLSMOOTH_WORKERS=4", "VOLSMOOTH_REQUIRE_TOKENS=true"};
+  const json in_force = json::parse(run(options, environment).output);
+  EXPECT_EQ(in_force.at("workers"), 4);
+  EXPECT_EQ(in_force.at("require-tokens"), true);
+  EXPECT_EQ(in_force.at("queue"), 7);
+  std::vector<std::string> said = options;
+  said.insert(said.end(), {"--workers", "5"});
+  EXPECT_EQ(json::parse(run(said, environment).output).at("workers"), 5);
 }
 
 TEST_F(OperatingTest, AVariableMayNameAFileThatHoldsTheValue) {
@@ -146,24 +160,44 @@ TEST_F(BackupTest, NeverOverwritesAndNamesWhatIsDamaged) {
   EXPECT_THAT(damaged.errors, HasSubstr(volume));
 }
 
-TEST_F(BackupTest, WhatIsDeletedMeanwhileIsLeftOutWhole) {
+TEST_F(BackupTest, AFileThatIsLostIsNamedAndNothingIsTakenForDeleted) {
   const ServiceClient service(daemon_);
-  const std::string volume = service.upload(ball_file(16)).at("id"),
+  const std::string lost = service.upload(ball_file(16)).at("id"),
                     kept = service.upload(ball_file(16)).at("id");
-  const json job = service.run({{"volume", volume}});
-  // As a deletion that comes between the database and the files leaves it.
-  fs::remove(daemon_.data() / "volumes" / volume);
-  fs::remove_all(daemon_.data() / "results");
-  fs::create_directory(daemon_.data() / "results");
+  fs::remove(daemon_.data() / "volumes" / lost);
+  const auto made = back_up(folder_ / "backup");
+  EXPECT_EQ(made.exit_code, 1);
+  EXPECT_THAT(made.errors, HasSubstr(lost));
+
+  fs::remove(folder_ / "backup" / "volumes" / kept);
   Daemon another(VOLSMOOTHD);
   start_on(another, [&](const fs::path& data) {
+    const auto brought = run({"restore", "--from", folder_ / "backup", "--data", data});
+    EXPECT_EQ(brought.exit_code, 1);
+    EXPECT_THAT(brought.errors, HasSubstr(kept));
+  });
+  EXPECT_EQ(ServiceClient(another).call("GET", "/v1/volumes/" + kept).status, 200);
+}
+
+TEST_F(BackupTest, WhatIsDeletedMeanwhileIsLeftOutWhole) {
+  const ServiceClient service(daemon_);
+  const std::string file = ball_file(48), kept = service.upload(file).at("id");
+  std::vector<std::string> volumes;
+  for (int k = 0; k < 30; ++k) volumes.push_back(service.upload(file).at("id"));
+  Daemon another(VOLSMOOTHD);
+  start_on(another, [&](const fs::path& data) {
+    std::jthread deleting([&] {
+      for (const std::string& volume : volumes) service.call("DELETE", "/v1/volumes/" + volume);
+    });
     const auto made = back_up(data);
     EXPECT_EQ(made.exit_code, 0) << made.errors;
   });
   const ServiceClient there(another);
-  EXPECT_EQ(there.call("GET", "/v1/volumes/" + volume).status, 410);
-  EXPECT_EQ(there.call("GET", "/v1/jobs/" + job.at("id").get<std::string>()).status, 410);
-  EXPECT_EQ(there.get("/v1/volumes/" + kept).at("id"), kept);
+  EXPECT_EQ(there.call("GET", "/v1/volumes/" + kept + "/content").body, file);
+  for (const json& volume : there.get("/v1/volumes").at("volumes")) {
+    const std::string id = volume.at("id");
+    EXPECT_EQ(there.call("GET", "/v1/volumes/" + id + "/content").body, file);
+  }
 }
 
 }  // namespace

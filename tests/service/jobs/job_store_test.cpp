@@ -295,9 +295,11 @@ TEST(StoreDatabase, TakesOverWhatAnEarlierVersionWrote) {
     Database as_it_was(file, Database::Access::kWriter);
     as_it_was.execute(
         "DROP TRIGGER volume_comes; DROP TRIGGER volume_goes; DROP TRIGGER result_comes; DROP TRIGGER "
-        "results_go; DROP TABLE usage; DROP INDEX queued_jobs; ALTER TABLE jobs DROP COLUMN due_ms; ALTER "
+        "results_go; DROP TABLE usage; DROP INDEX queued_jobs; DROP INDEX unfinished_disk; ALTER TABLE jobs "
+        "DROP COLUMN due_ms; ALTER "
         "TABLE "
         "jobs DROP COLUMN disk_bytes; "
+        "DROP INDEX jobs_by_tenant_state; DROP INDEX jobs_by_tenant_method; DROP INDEX jobs_by_tenant_label; "
         "DROP INDEX jobs_by_state; CREATE INDEX unfinished_jobs ON jobs (state, sequence) "
         "WHERE state IN ('queued', 'running'); DROP TABLE delivered_instances; DROP TABLE deliveries; DROP "
         "TABLE arrivals; "
