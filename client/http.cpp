@@ -127,6 +127,8 @@ struct HttpClient::Handles {
       curl_easy_setopt(easy, CURLOPT_UNIX_SOCKET_PATH, server.socket_path.c_str());
     if (server.is_local()) curl_easy_setopt(easy, CURLOPT_PROXY, "");
     if (!server.ca_file.empty()) curl_easy_setopt(easy, CURLOPT_CAINFO, server.ca_file.c_str());
+    if (!server.ca_file.empty())
+      curl_easy_setopt(easy, CURLOPT_CAPATH, nullptr);  // the system's would count as well
     curl_easy_setopt(easy, CURLOPT_PROTOCOLS_STR, "http,https");
     curl_easy_setopt(easy, CURLOPT_PATH_AS_IS, 1L);
     curl_easy_setopt(easy, CURLOPT_NOSIGNAL, 1L);

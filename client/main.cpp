@@ -34,6 +34,11 @@ Expected<void> run_on(const ServerAddress& server, bool is_private, const Option
                       const Console& console, const Interruption& interruption) {
   const auto token = read_token(options.token_file);
   if (!token) return tl::unexpected(token.error());
+  if (!token->empty() && !server.is_confidential() && !options.plain_token)
+    return fail(
+        ExitCode::kNotAllowed,
+        "The token would cross the network for everybody to read; use https://, or --plain-token where "
+        "something else keeps it secret.");
   HttpClient http(server, is_private ? "" : *token, interruption,
                   [&](const std::string& line) { console.note(line); });
   Api api(http);

@@ -51,6 +51,7 @@ void add_common_options(CLI::App& app, Options& options) {
       ->envname("VOLSMOOTH_SERVER");
   app.add_option("--token-file", options.token_file,
                  "File with the access token (or the token in VOLSMOOTH_TOKEN)");
+  app.add_flag("--plain-token", options.plain_token, "Send the token without TLS, also to another machine");
   app.add_option("--ca-file", options.ca_file,
                  "Certificates (PEM) that an https server is trusted by, in place of the system's (or "
                  "VOLSMOOTH_CA_FILE)")

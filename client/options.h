@@ -30,6 +30,7 @@ struct Options {
   std::string command;
 
   std::string server;  ///< empty: none given
+  bool plain_token = false;
   std::filesystem::path token_file, ca_file;
   bool json = false, quiet = false, verbose = false;
 

@@ -1,5 +1,6 @@
 #include "client/server_address.h"
 
+#include <arpa/inet.h>
 #include <curl/curl.h>
 #include <sys/un.h>
 
@@ -35,13 +36,20 @@ Expected<ServerAddress> socket_address(std::string_view path, std::string_view t
   return ServerAddress{"http://localhost", file, std::string(text)};
 }
 
+/// Of 127.0.0.0/8, written as an address: names may be anybody's.
+bool is_loopback(const std::string& host) {
+  constexpr std::uint32_t kLoopbackNet = 127;
+  in_addr address{};
+  return inet_pton(AF_INET, host.c_str(), &address) == 1 && ntohl(address.s_addr) >> 24 == kLoopbackNet;
+}
+
 }  // namespace
 
 bool ServerAddress::is_local() const {
   const Url parsed(curl_url(), &curl_url_cleanup);
   curl_url_set(parsed.get(), CURLUPART_URL, url.c_str(), 0);
   const std::string host = part_of(parsed, CURLUPART_HOST);
-  return !socket_path.empty() || host == "localhost" || host == "[::1]" || host.starts_with("127.");
+  return !socket_path.empty() || host == "localhost" || host == "[::1]" || is_loopback(host);
 }
 
 Expected<ServerAddress> parse_server(std::string_view text) {

@@ -17,6 +17,8 @@ struct ServerAddress {
   std::string ca_file = {};  ///< whom to trust by TLS; empty: whom the system trusts
 
   bool is_local() const;  ///< never through a proxy
+  /// Whether what is sent there can be read by nobody else: by TLS, or not leaving this machine.
+  bool is_confidential() const { return url.starts_with("https://") || is_local(); }
 };
 
 /// Reads "http://host:port", "https://host:port", "unix:/path", "http+unix:///path" or "http+unix://%2Fpath".

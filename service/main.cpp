@@ -200,8 +200,7 @@ void listen_for_devices(const Options& options, JobService& jobs, std::optional<
     return jobs.receive(device, name, std::move(file));
   };
   inbox.max_bytes = options.jobs.max_upload_bytes;
-  listener.emplace(DimseListener::Settings{options.dimse_listen,
-                                           options.allow_open_dimse || options.server.allow_open_network,
+  listener.emplace(DimseListener::Settings{options.dimse_listen, options.allow_open_dimse,
                                            presets_by_title(options.presets), log_event},
                    std::move(inbox));
   log_event("dimse-ready", "listening for DICOM associations on " + listener->address());

@@ -258,8 +258,8 @@ struct Server::State {
   std::filesystem::path socket_path;
   std::unordered_set<Session*> sessions;
   std::promise<void> all_ended;
-  std::function<void()> close_acceptor;
   asio::io_context io{1};
+  std::function<void()> close_acceptor;  // gone before the I/O context, which the acceptor needs
   // Gone before the I/O context: their threads hand results to it.
   ThreadPool reading{kReadingThreads, ThreadPool::Priority::kNormal};
   ThreadPool writing{kWritingThreads, ThreadPool::Priority::kNormal};

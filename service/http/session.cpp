@@ -89,6 +89,7 @@ Session::Awaitable<bool> Session::serve_one() {
 Session::Awaitable<void> Session::serve(Exchange& exchange) {
   const auto bytes = co_await connection_.read_head(context_.settings.head_seconds);
   waiting_since_.reset();
+  made_way_ = false;
   if (!bytes) {
     if (bytes.error() == ReadFailure::kTimeout)
       co_await send(exchange, tl::unexpected(problem_of(bytes.error())));
@@ -182,6 +183,13 @@ Session::Awaitable<void> Session::handle(Exchange& exchange, std::unique_ptr<Bod
   co_await send(exchange, std::move(reply));
 }
 
+/// For a body that nobody needs or that comes from somebody unknown: whoever trickles it must not hold the
+/// connection.
+double Session::patience_with_strangers() const {
+  constexpr double kSeconds = 0.5;
+  return std::min(context_.settings.body_seconds, kSeconds);
+}
+
 /// Answers before the body was read; a small one is then skipped to keep the connection.
 Session::Awaitable<void> Session::refuse_unread(Exchange& exchange, Problem problem) {
   const Head& head = exchange.request.head;
@@ -191,7 +199,7 @@ Session::Awaitable<void> Session::refuse_unread(Exchange& exchange, Problem prob
   co_await send(exchange, tl::unexpected(std::move(problem)));
   std::vector<char> skipped(kMaxDrainedBytes);
   while (exchange.keep_alive) {
-    const auto bytes = co_await connection_.read_body(skipped, context_.settings.body_seconds);
+    const auto bytes = co_await connection_.read_body(skipped, patience_with_strangers());
     exchange.keep_alive = bytes.has_value();
     if (bytes && bytes->empty()) break;
   }
@@ -209,7 +217,8 @@ Session::Awaitable<tl::expected<void, Problem>> Session::receive_body(Exchange& 
   std::vector<char> block(static_cast<std::size_t>(head.has_body() ? wanted : 1));
   ThreadPool& pool = exchange.request.file ? context_.bulk : context_.reading;
   for (;;) {
-    const auto bytes = co_await connection_.read_body(block, context_.settings.body_seconds);
+    const auto bytes = co_await connection_.read_body(
+        block, exchange.route->scope ? context_.settings.body_seconds : patience_with_strangers());
     if (!bytes) co_return tl::unexpected(problem_of(bytes.error()));
     if (auto current = check_current(exchange); !current) co_return current;
     if (bytes->empty()) co_return tl::expected<void, Problem>();

@@ -46,7 +46,9 @@ class Session {
   void tell_news();
 
   /// Since when it waits for a request or the rest of its head; none: it is at work.
-  std::optional<std::chrono::steady_clock::time_point> waiting_since() const { return waiting_since_; }
+  std::optional<std::chrono::steady_clock::time_point> waiting_since() const {
+    return made_way_ ? std::nullopt : waiting_since_;
+  }
   /// Ends it while it waits, without a word.
   void make_way();
 
@@ -81,6 +83,7 @@ class Session {
   Awaitable<bool> serve_one();
   Awaitable<void> serve(Exchange& exchange);
   Awaitable<void> handle(Exchange& exchange, std::unique_ptr<BodyReceiver> receiver);
+  double patience_with_strangers() const;
   Awaitable<void> refuse_unread(Exchange& exchange, Problem problem);
   Awaitable<tl::expected<void, Problem>> receive_body(Exchange& exchange, BodyReceiver& receiver);
 

@@ -103,7 +103,8 @@ Session::Awaitable<void> Session::send(Exchange& exchange, Reply reply) {
 Session::Awaitable<Reply> Session::audited(Exchange& exchange, Reply reply) {
   auto entry = audit_entry(exchange.route, exchange.request, reply);
   if (!entry) co_return reply;
-  if (entry->outcome == "unauthenticated") {
+  const bool is_known = !exchange.request.caller.token.empty();
+  if (!is_known && (entry->outcome == "unauthenticated" || entry->outcome == "cross-origin")) {
     const auto left_out = context_.unknown_callers.admit();
     if (!left_out) co_return reply;
     if (*left_out > 0) entry->outcome += ", and " + std::to_string(*left_out) + " before it without a row";

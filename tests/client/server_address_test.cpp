@@ -25,11 +25,19 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(AddressCase{"http://127.0.0.1:8742", "http://127.0.0.1:8742", "", true},
                     AddressCase{"http://localhost:1/", "http://localhost:1", "", true},
                     AddressCase{"http://[::1]:8742", "http://[::1]:8742", "", true},
+                    AddressCase{"http://127.evil.example", "http://127.evil.example", "", false},
                     AddressCase{"https://smooth.example/base/", "https://smooth.example/base", "", false},
                     AddressCase{"unix:/run/v/socket", "http://localhost", "/run/v/socket", true},
                     AddressCase{"unix:///run/v/socket", "http://localhost", "/run/v/socket", true},
                     AddressCase{"http+unix:///run/v", "http://localhost", "/run/v", true},
                     AddressCase{"http+unix://%2Frun%2Fv", "http://localhost", "/run/v", true}));
+
+TEST(Server, IsConfidentialByTlsOrOnThisMachine) {
+  for (const char* text : {"https://smooth.example", "http://127.0.0.1:8742", "unix:/run/v"})
+    EXPECT_TRUE(parse_server(text)->is_confidential()) << text;
+  for (const char* text : {"http://smooth.example", "http://10.0.0.1:8742", "http://127.0.0.1.example"})
+    EXPECT_FALSE(parse_server(text)->is_confidential()) << text;
+}
 
 class NoServer : public testing::TestWithParam<std::string> {};
 

@@ -110,6 +110,16 @@ TEST(Tokens, LetTheClientIn) {
   EXPECT_EQ(smooth.exit_code(), 0) << smooth.error();
 }
 
+TEST(Tokens, AreNotSentToAnotherMachineInTheClear) {
+  const TemporaryDirectory folder;
+  write_file(folder / "token", "secret");
+  const std::vector<std::string> asking{"volumes", "--server", "http://192.0.2.1:1", "--token-file",
+                                        (folder / "token").string()};
+  ClientRun refused(asking);
+  EXPECT_EQ(refused.exit_code(), 77);
+  EXPECT_THAT(refused.error(), HasSubstr("--plain-token"));
+}
+
 /// The long form is measure_tenants.
 TEST(Tokens, LeaveNoWayToAnotherTenantsThings) {
   Daemon daemon(VOLSMOOTHD);

@@ -28,7 +28,7 @@ TEST(ListeningSocket, ATakenPortIsSaid) {
 }
 
 TEST(ListeningSocket, OthersReachItOnlyWhenThatIsAllowed) {
-  EXPECT_THAT(refusal_of("0.0.0.0:0"), testing::HasSubstr("--allow-open-network"));
+  EXPECT_THAT(refusal_of("0.0.0.0:0"), testing::HasSubstr("--allow-open-dimse"));
   EXPECT_EQ(refusal_of("0.0.0.0:0", true), "");
   EXPECT_EQ(refusal_of("127.1.2.3:0"), "");
 }
