@@ -1,7 +1,5 @@
 #include "service/backup_commands.h"
 
-#include <fcntl.h>
-
 #include <iostream>
 #include <set>
 #include <stdexcept>

@@ -120,11 +120,9 @@ class VertexWriter {
     static const auto complete = vertex_packet_kernel(instruction_sets().back());
     complete({&packet_});
     for (std::size_t p = 0; p < waiting_; ++p) {
-      for (std::size_t a = 0; a < 3; ++a) {
-        mesh_.positions[vertices_[p]][a] = packet_.position[a][p];
-        mesh_.normals[vertices_[p]][a] = packet_.normal[a][p];
-      }
-      mesh_.curvatures[vertices_[p]] = packet_.curvature[p];
+      const auto& [x, y, z] = packet_.position;
+      const auto& [nx, ny, nz] = packet_.normal;
+      write(vertices_[p], {{x[p], y[p], z[p]}, {nx[p], ny[p], nz[p]}, packet_.curvature[p]});
     }
     waiting_ = 0;
   }

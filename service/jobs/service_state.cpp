@@ -334,9 +334,12 @@ tl::expected<void, Problem> JobService::State::check(const JobOrder& order) cons
   return check_parameters(order.parameters, *method);
 }
 
+std::int64_t JobService::State::unpromised_bytes() {
+  return std::max<std::int64_t>(files.available_bytes() - jobs.disk_bytes_of_unfinished(), 0);
+}
+
 tl::expected<IncomingFile, Problem> JobService::State::begin_file(std::int64_t bytes) {
-  const std::int64_t free =
-      std::max<std::int64_t>(files.available_bytes() - jobs.disk_bytes_of_unfinished(), 0);
+  const std::int64_t free = unpromised_bytes();
   if (bytes <= free)
     if (auto file = files.receive(bytes)) return *std::move(file);
   return refuse("insufficient-storage", "The disk has too little free space for this upload.",
@@ -354,8 +357,7 @@ tl::expected<void, Problem> JobService::State::within_quota(const Caller& caller
 
 tl::expected<void, Problem> JobService::State::room_for(const Caller& caller, const JobPlan& plan) {
   if (auto within = within_quota(caller, plan.disk_bytes); !within) return within;
-  const std::int64_t free =
-      std::max<std::int64_t>(files.available_bytes() - jobs.disk_bytes_of_unfinished(), 0);
+  const std::int64_t free = unpromised_bytes();
   if (plan.disk_bytes <= free) return {};
   return refuse(
       "insufficient-storage",

@@ -70,6 +70,7 @@ struct JobService::State {
                                              const std::string& id);
   tl::expected<void, Problem> check(const JobOrder& order) const;
   JobStore::QueueLimits queue_limits() const { return {settings.max_queued, settings.tenant_max_queued}; }
+  std::int64_t unpromised_bytes();  ///< of the disk, beside the results of unfinished jobs
   /// A file to receive so many bytes into, on a disk that keeps room for the results of unfinished jobs.
   tl::expected<IncomingFile, Problem> begin_file(std::int64_t bytes);
   /// Whether the caller's tenant may keep so much more.

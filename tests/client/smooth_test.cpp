@@ -2,15 +2,14 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <openssl/sha.h>
 
 #include <csignal>
-#include <cstdio>
 #include <map>
 #include <utility>
 
 #include "tests/client/canned_server.h"
 #include "tests/support/scratch_folder.h"
+#include "tests/support/sha256.h"
 
 namespace volsmooth {
 namespace {
@@ -19,21 +18,9 @@ using testing::ElementsAre;
 using testing::IsEmpty;
 using Json = nlohmann::json;
 
-std::string sha256(const std::string& bytes) {
-  unsigned char sum[SHA256_DIGEST_LENGTH];
-  SHA256(reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size(), sum);
-  std::string text;
-  for (const unsigned char byte : sum) {
-    char digits[3];
-    std::snprintf(digits, sizeof digits, "%02x", byte);
-    text += digits;
-  }
-  return text;
-}
-
 Json result(const std::string& name, const std::string& content, const Json& isovalue = nullptr) {
   return {{"name", name},         {"kind", "surface"},       {"method", "laplacian"},
-          {"isovalue", isovalue}, {"bytes", content.size()}, {"sha256", sha256(content)}};
+          {"isovalue", isovalue}, {"bytes", content.size()}, {"sha256", test::sha256_hex(content)}};
 }
 
 Json job(const std::string& state, const Json& results = Json::array(), const Json& error = nullptr) {

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <openssl/sha.h>
 #include <sqlite3.h>
 
 #include <filesystem>
@@ -11,19 +10,9 @@
 #include <vector>
 
 #include "tests/support/child_process.h"
+#include "tests/support/sha256.h"
 
 namespace volsmooth::test {
-
-inline std::string sha256_hex(std::string_view bytes) {
-  unsigned char digest[SHA256_DIGEST_LENGTH];
-  SHA256(reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size(), digest);
-  std::string hex;
-  for (const unsigned char byte : digest) {
-    hex += "0123456789abcdef"[byte >> 4];
-    hex += "0123456789abcdef"[byte & 15];
-  }
-  return hex;
-}
 
 /// What is wrong between the rows and the files of a data directory that no daemon has open: a damaged
 /// database, files that nobody refers to, files that are missing or have other bytes than their row says.

@@ -1,6 +1,5 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <openssl/sha.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -8,6 +7,7 @@
 #include <set>
 #include <thread>
 
+#include "tests/support/sha256.h"
 #include "tests/system/nifti_bytes.h"
 #include "tests/system/service_client.h"
 
@@ -20,17 +20,6 @@ constexpr int kJobs = 40;
 int kills() {
   const char* wanted = std::getenv("VOLSMOOTH_TEST_KILLS");
   return wanted == nullptr ? 6 : std::atoi(wanted);
-}
-
-std::string sha256_of(std::string_view bytes) {
-  unsigned char digest[SHA256_DIGEST_LENGTH];
-  SHA256(reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size(), digest);
-  std::string hex;
-  for (const unsigned char byte : digest) {
-    hex += "0123456789abcdef"[byte >> 4];
-    hex += "0123456789abcdef"[byte & 15];
-  }
-  return hex;
 }
 
 /// What was asked for and acknowledged, over all restarts.
@@ -62,7 +51,7 @@ void expect_whole_results(const ServiceClient& service, const json& job, std::ve
     names.push_back(name);
     const std::string bytes = service.fetch(job.at("id"), name);
     EXPECT_EQ(bytes.size(), result.at("bytes").get<std::size_t>()) << name;
-    EXPECT_EQ(sha256_of(bytes), result.at("sha256")) << name;
+    EXPECT_EQ(sha256_hex(bytes), result.at("sha256")) << name;
   }
   EXPECT_THAT(names, testing::UnorderedElementsAreArray(expected));
 }
@@ -96,7 +85,7 @@ std::multiset<std::string> stored_files(const Daemon& daemon) {
   for (const auto& entry : std::filesystem::recursive_directory_iterator(daemon.data())) {
     const std::string name = entry.path().filename();
     const bool bookkeeping = name.starts_with("volsmooth.db") || name.find("lock") != std::string::npos;
-    if (entry.is_regular_file() && !bookkeeping) files.insert(sha256_of(content_of(entry.path())));
+    if (entry.is_regular_file() && !bookkeeping) files.insert(sha256_hex(content_of(entry.path())));
   }
   return files;
 }
