@@ -1,7 +1,9 @@
 #include "algorithms/flows/explicit_steps.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <vector>
 
 #include "algorithms/volume/large_pages.h"
@@ -23,16 +25,18 @@ void for_each_chunk(std::span<float> voxels, const std::function<void(std::span<
       [&](double) { report(fraction); });
 }
 
+/// By their bits, whose order is that of the magnitudes: maxima of integers are vectorised.
 float largest_magnitude(std::span<float> voxels, const Progress& report) {
-  std::vector<float> largest(voxels.size() / kChunk + 1, 0.0F);
+  std::vector<std::int32_t> largest(voxels.size() / kChunk + 1, 0);
   for_each_chunk(
       voxels,
       [&](std::span<float> chunk) {
-        float& found = largest[static_cast<std::size_t>(chunk.data() - voxels.data()) / kChunk];
-        for (const float value : chunk) found = std::max(found, std::abs(value));
+        std::int32_t found = 0;
+        for (const float value : chunk) found = std::max(found, std::bit_cast<std::int32_t>(std::abs(value)));
+        largest[static_cast<std::size_t>(chunk.data() - voxels.data()) / kChunk] = found;
       },
       report, 0);
-  return *std::ranges::max_element(largest);
+  return std::bit_cast<float>(*std::ranges::max_element(largest));
 }
 
 /// The power of two to multiply a volume with so that squares of its differences neither overflow nor vanish

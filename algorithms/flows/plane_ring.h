@@ -1,9 +1,14 @@
 #pragma once
 
+#include <oneapi/tbb/cache_aligned_allocator.h>
+
 #include <cstdint>
 #include <vector>
 
 namespace volsmooth {
+
+/// Floats for row kernels: a vector's worth of them never lies across two lines of the cache.
+using AlignedFloats = std::vector<float, oneapi::tbb::cache_aligned_allocator<float>>;
 
 /// The last few planes of a tile while a sweep moves along z: rows of floats that stay in cache. A row has
 /// room for at least one voxel before it and for whole vectors after it, so that row kernels need neither
@@ -31,7 +36,7 @@ class PlaneRing {
 
  private:
   std::int64_t planes_ = 0, rows_ = 0, stride_ = 0;
-  std::vector<float> floats_;
+  AlignedFloats floats_;
 };
 
 }  // namespace volsmooth

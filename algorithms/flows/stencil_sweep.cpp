@@ -59,7 +59,7 @@ class TileSweep {
   std::int64_t radius_;
   PlaneRing ring_;
   std::vector<const float*> rows_;
-  std::vector<float> out_;
+  AlignedFloats out_;
 };
 
 }  // namespace

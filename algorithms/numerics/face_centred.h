@@ -64,9 +64,9 @@ struct FaceCentredRate {
 /// still. The larger of the two counts; on smooth data away from extrema that is the central difference.
 template <class Scalar, class Metric, class Rho>
 VOLSMOOTH_FORMULA FaceCentredRate<Scalar> face_centred_rate(const Rho& rho, const Metric& metric) {
-  constexpr Scalar kHalf{0.5};
   const auto central = [&](std::size_t axis, const VoxelOffset& at) VOLSMOOTH_INLINE {
-    return kHalf * (rho(moved_along(at, axis, 1)) - rho(moved_along(at, axis, -1)));
+    return (rho(moved_along(at, axis, 1)) - rho(moved_along(at, axis, -1))) *
+           (Scalar{0.5} * metric.scale(axis));
   };
   const Scalar here = rho(VoxelOffset{0, 0, 0});
   FaceCentredRate<Scalar> rate{.speed = 0, .gradient = 0, .lowest = here, .highest = here};
@@ -75,26 +75,25 @@ VOLSMOOTH_FORMULA FaceCentredRate<Scalar> face_centred_rate(const Rho& rho, cons
 
   Spread<Scalar> spread;
   unrolled<3>([&](auto e) VOLSMOOTH_INLINE {
-    std::array<std::array<Scalar, 3>, 2> gradients;  // [before, after]
-    std::array<Scalar, 2> fluxes;
+    std::array<std::array<Scalar, 3>, 2> gradients;  // [before, after], twice
+    std::array<Scalar, 2> normal, length;
     unrolled<2>([&](auto side) VOLSMOOTH_INLINE {
       const VoxelOffset next = moved_along({0, 0, 0}, e, side == 0 ? -1 : 1);
       const Scalar there = rho(next);
       std::array<Scalar, 3> on_face;
       unrolled<3>([&](auto f) VOLSMOOTH_INLINE {
         if constexpr (f == e)
-          on_face[f] = side == 0 ? here - there : there - here;
+          on_face[f] = (side == 0 ? here - there : there - here) * (Scalar{2} * metric.scale(f));
         else
-          on_face[f] = kHalf * (differences[f] + central(f, next));
+          on_face[f] = differences[f] + central(f, next);
       });
-      gradients[side] = metric.gradient(on_face);
-      const Scalar square = square_of(gradients[side]);
-      const Scalar inverse =
-          square >= std::numeric_limits<Scalar>::min() ? Scalar{1} / std::sqrt(square) : Scalar{0};
-      fluxes[side] = metric.flux(gradients[side], e) * inverse;
+      gradients[side] = metric.gradient_of_scaled(on_face);
+      length[side] = std::sqrt(std::max(square_of(gradients[side]), std::numeric_limits<Scalar>::min()));
+      normal[side] = metric.flux(gradients[side], e);
       rate.include(there);
     });
-    rate.speed += fluxes[1] - fluxes[0];
+    // The difference of the two quotients, by one division.
+    rate.speed += (normal[1] * length[0] - normal[0] * length[1]) / (length[0] * length[1]);
     spread.add(gradients[0], gradients[1]);
   });
   if constexpr (!Metric::kRightAngles) {
@@ -103,8 +102,9 @@ VOLSMOOTH_FORMULA FaceCentredRate<Scalar> face_centred_rate(const Rho& rho, cons
       rate.include(rho(VoxelOffset{kNeighbour % 3 - 1, kNeighbour / 3 % 3 - 1, kNeighbour / 9 - 1}));
     });
   }
-  constexpr Scalar kOfSpread = Scalar{2} / Scalar{9};
-  rate.gradient = std::sqrt(std::max(square_of(metric.gradient(differences)), kOfSpread * spread.value()));
+  constexpr Scalar kOfSpread = Scalar{1} / Scalar{18};  // 2/9, of twice the gradients
+  rate.gradient =
+      std::sqrt(std::max(square_of(metric.gradient_of_scaled(differences)), kOfSpread * spread.value()));
   return rate;
 }
 

@@ -27,6 +27,11 @@ struct OrthogonalMetric {
   VOLSMOOTH_FORMULA Scalar flux(const std::array<Scalar, 3>& gradient, std::size_t axis) const {
     return gradient[axis] * inverse_spacing[axis];
   }
+  /// `gradient(d) = gradient_of_scaled(d')` with d'_e = d_e `scale(e)`: many sums can be taken in between.
+  VOLSMOOTH_FORMULA Scalar scale(std::size_t axis) const { return inverse_spacing[axis]; }
+  VOLSMOOTH_FORMULA std::array<Scalar, 3> gradient_of_scaled(const std::array<Scalar, 3>& scaled) const {
+    return scaled;
+  }
 };
 
 /// Any axes: L is upper triangular (the transposed Cholesky factor of G^-1).
@@ -53,6 +58,10 @@ struct AnyMetric {
     Scalar sum = rows[0][axis] * gradient[0];
     unrolled<axis>([&](auto n) VOLSMOOTH_INLINE { sum += rows[n + 1][axis] * gradient[n + 1]; });
     return sum;
+  }
+  VOLSMOOTH_FORMULA Scalar scale(std::size_t) const { return Scalar{1}; }
+  VOLSMOOTH_FORMULA std::array<Scalar, 3> gradient_of_scaled(const std::array<Scalar, 3>& scaled) const {
+    return gradient(scaled);
   }
 };
 
