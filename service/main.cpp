@@ -1,5 +1,6 @@
 // The composition root: the only file that knows everyone.
 
+#include <malloc.h>
 #include <signal.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -170,6 +171,13 @@ int connections_for(std::int64_t open_files) {
   return static_cast<int>(std::max<std::int64_t>((open_files - kOther) / 2, 1));
 }
 
+/// What an answer of 100 KB takes is not given back to the system only to be asked for again by the next one:
+/// that was a fifth of the time of a page of jobs. Volumes are given back at once.
+void keep_memory_of_answers() {
+  ::mallopt(M_MMAP_THRESHOLD, 4 << 20);
+  ::mallopt(M_TRIM_THRESHOLD, 8 << 20);
+}
+
 /// Without TLS, SIGHUP ends the daemon like any program whose terminal goes.
 sigset_t awaited_signals(const Options& options) {
   sigset_t set;
@@ -255,8 +263,7 @@ void serve(const Options& options) {
   listener.reset();
   control.reset();
   server.stop();
-  if (store_lost)
-    throw std::runtime_error("nobody knows whether a commit stands; the next start finds out and recovers");
+  if (store_lost) throw std::runtime_error(jobs.not_ready_because().value_or("the store was lost"));
 }
 
 /// The exit code of what is done instead of serving.
@@ -304,6 +311,7 @@ int run(int argc, char** argv) {
   options.server.max_connections =
       std::min(options.server.max_connections, connections_for(raise_open_files()));
 
+  keep_memory_of_answers();
   // Before any thread is there: all inherit the mask, and only sigwait takes them.
   const sigset_t signals = awaited_signals(options);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);

@@ -328,7 +328,7 @@ ServiceStatistics JobService::statistics() {
 }
 
 std::optional<std::string> JobService::not_ready_because() {
-  if (state_->database.condemned()) return "a commit failed; restart the daemon to recover";
+  if (auto trouble = state_->database.trouble()) return trouble;
   if (!state_->started) return "starting";
   if (state_->stopping) return "stopping";
   if (state_->files.available_bytes() < 0) return "the disk is full";

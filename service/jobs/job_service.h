@@ -162,8 +162,8 @@ class JobService {
   /// Called once for every job that becomes final, with its document; for metrics. Set before `start`.
   void on_final(std::function<void(const Job&)> observer);
 
-  /// Called once, from any thread, when a commit failed so that only a restart can tell whether it stands:
-  /// the process is to end, and the next start recovers. Set before `start`.
+  /// Called from any thread when a commit failed so that only a restart can tell whether it stands, or when
+  /// the database turns out to be damaged: the process is to end; `not_ready_because` says why.
   void on_store_lost(std::function<void()> observer);
 
   /// Audits what an actor (ActingFor) did that changes nothing here, such as a download; durable when it

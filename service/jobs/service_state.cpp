@@ -15,6 +15,8 @@
 namespace volsmooth {
 namespace {
 
+/// Of the database, at the start: enough for all of some 10,000 jobs.
+constexpr auto kCheckedFirst = std::chrono::milliseconds(500);
 constexpr int kExchanges = 2;  ///< with nodes, at the same time and in each direction
 
 std::vector<std::string> names_of(const auto& offered) {
@@ -41,7 +43,7 @@ JobService::State::State(JobServiceSettings given, Engine computing, Pacs networ
       engine(std::move(computing)),
       pacs(std::move(network)),
       files(settings.data_dir, settings.reserved_disk_bytes),
-      database(files.path_of("volsmooth.db"), settings.clock),
+      database(files.path_of("volsmooth.db"), kCheckedFirst, settings.clock),
       audit_queue(database),
       stored_files(database, files),
       tokens(database),

@@ -1,11 +1,14 @@
 #include "service/jobs/store_database.h"
 
+#include <fcntl.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <array>
 #include <stdexcept>
 #include <string>
+
+#include "service/storage/posix.h"
 
 namespace volsmooth {
 namespace {
@@ -254,10 +257,21 @@ std::size_t schema_version(Database& database) {
   return static_cast<std::size_t>(version.integer(0));
 }
 
+constexpr const char* kDamaged = "the database is damaged; restore the data directory from a backup";
+
 void check_integrity(Database& database) {
-  Statement check = database.query("PRAGMA quick_check(1)");
-  if (!check.step() || check.text(0) != "ok")
-    throw std::runtime_error("the database is damaged; restore the data directory from a backup");
+  if (!is_sound(database)) throw std::runtime_error(kDamaged);
+}
+
+/// Is there from when damage was found until a check finds none.
+std::filesystem::path mark_of_damage(std::filesystem::path database_file) {
+  return database_file += ".damaged";
+}
+
+void mark_damage(const std::filesystem::path& database_file) try {
+  open_file(mark_of_damage(database_file), O_WRONLY | O_CREAT);
+} catch (const std::exception& error) {  // the next start finds it as this one did
+  spdlog::error("that the database is damaged could not be marked: {}", error.what());
 }
 
 /// What the last daemon sealed must be there. If not, that is audited: the next seal would hide it.
@@ -271,7 +285,6 @@ void check_audit(Database& database, const AuditHead& sealed) {
 
 /// Creates what is missing and counts the start, all in one transaction.
 std::int64_t prepare(Database& database, const AuditHead& sealed) {
-  check_integrity(database);
   Transaction transaction(database, Transaction::Kind::kWrite);
   const std::size_t version = schema_version(database);
   if (version > kNewestVersion)
@@ -290,12 +303,51 @@ std::int64_t prepare(Database& database, const AuditHead& sealed) {
 
 }  // namespace
 
-StoreDatabase::StoreDatabase(const std::filesystem::path& file, std::function<Time()> clock)
+StoreDatabase::StoreDatabase(const std::filesystem::path& file, CheckFirst check, std::function<Time()> clock)
     : clock_(std::move(clock)),
       writer_(file, Database::Access::kWriter),
+      integrity_(begin_check(file, check)),
       seal_(file),
       start_number_(prepare(writer_, seal_.last())),
       reader_(file, Database::Access::kReader) {}
+
+/// None: it is over.
+std::unique_ptr<IntegrityCheck> StoreDatabase::begin_check(const std::filesystem::path& file,
+                                                           CheckFirst check) {
+  const auto mark = mark_of_damage(file);
+  if (!check || schema_version(writer_) != kNewestVersion || std::filesystem::exists(mark)) {
+    check_integrity(writer_);
+    std::filesystem::remove(mark);
+    return nullptr;
+  }
+  auto begun = std::make_unique<IntegrityCheck>(file, [this, file] {
+    mark_damage(file);
+    damage_found();
+  });
+  if (!begun->sound_within(*check).value_or(true)) throw std::runtime_error(kDamaged);
+  return begun;
+}
+
+void StoreDatabase::damage_found() {
+  spdlog::critical(kDamaged);
+  const std::lock_guard lock(writer_mutex_);
+  damaged_ = true;
+  writer_.condemn();
+  on_condemned_();
+}
+
+std::optional<std::string> StoreDatabase::trouble() const {
+  if (damaged_) return kDamaged;
+  if (condemned())
+    return "a commit failed, and nobody knows whether it stands; the next start finds out and recovers";
+  return std::nullopt;
+}
+
+void StoreDatabase::on_condemned(std::function<void()> observer) {
+  const std::lock_guard lock(writer_mutex_);
+  on_condemned_ = std::move(observer);
+  if (condemned()) on_condemned_();
+}
 
 void StoreDatabase::commit(Transaction& transaction) {
   const AuditHead head = audit_head(writer_);

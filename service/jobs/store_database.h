@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <string_view>
@@ -13,6 +14,7 @@
 #include "service/jobs/audit_seal.h"
 #include "service/jobs/job.h"
 #include "service/storage/database.h"
+#include "service/storage/integrity_check.h"
 
 namespace volsmooth {
 
@@ -26,8 +28,12 @@ Time now_in_milliseconds();
 /// for a writer's fsync. Thread-safe.
 class StoreDatabase {
  public:
-  /// Opens or creates it, checks it, and counts this start.
-  explicit StoreDatabase(const std::filesystem::path& file,
+  /// For how long the check of the whole database comes before anything else; what is left of it then
+  /// happens beside the use. None: to its end.
+  using CheckFirst = std::optional<std::chrono::milliseconds>;
+  /// Opens or creates it, checks it, and counts this start. Damage throws std::runtime_error, or condemns it
+  /// when it is found beside the use.
+  explicit StoreDatabase(const std::filesystem::path& file, CheckFirst check = std::nullopt,
                          std::function<Time()> clock = now_in_milliseconds);
 
   /// The number of this start of the daemon: 1, 2, ...
@@ -61,22 +67,28 @@ class StoreDatabase {
   void clear_log();
   void forget_tombstones(Time before);
 
-  /// True once it is open whether a commit will survive a restart; every write throws from then on.
+  /// True once it is open whether a commit will survive a restart, or damage was found; every write throws
+  /// from then on.
   bool condemned() const { return writer_.condemned(); }
-  /// Called once when that comes about. Set before other threads use the database.
-  void on_condemned(std::function<void()> observer) { on_condemned_ = std::move(observer); }
+  std::optional<std::string> trouble() const;  ///< why, and what is to be done
+  /// Called when that comes about, or at once when it has; holding up all writes.
+  void on_condemned(std::function<void()> observer);
 
  private:
+  std::unique_ptr<IntegrityCheck> begin_check(const std::filesystem::path& file, CheckFirst check);
+  void damage_found();
   void commit(Transaction& transaction);
 
   const std::function<Time()> clock_;
   std::mutex writer_mutex_, reader_mutex_;      // where both are needed, in this order
   std::atomic<bool> log_holds_deleted_ = true;  // what the last daemon did is not known
-  Database writer_;                             // before the reader, which must be closed first
-  AuditSeal seal_;                              // written under the writer's mutex
+  std::atomic<bool> damaged_ = false;
+  std::function<void()> on_condemned_ = [] {};
+  Database writer_;  // before the readers, which must be closed first
+  std::unique_ptr<IntegrityCheck> integrity_;
+  AuditSeal seal_;  // written under the writer's mutex
   std::int64_t start_number_;
   Database reader_;
-  std::function<void()> on_condemned_ = [] {};
 };
 
 // The pieces that volumes and jobs share. Those that write belong into the caller's transaction.

@@ -119,12 +119,16 @@ void Database::execute(const char* sql) {
   if (code != SQLITE_OK) throw_error(connection_.get(), code);
 }
 
+void Database::interrupt() {
+  sqlite3_interrupt(connection_.get());
+}
+
 int Database::changes() const {
   return sqlite3_changes(connection_.get());
 }
 
 Transaction::Transaction(Database& database, Kind kind) : database_(database) {
-  if (database.condemned_) throw DatabaseError(SQLITE_IOERR, "a commit failed; restart to recover");
+  if (database.condemned_) throw DatabaseError(SQLITE_IOERR, "nothing is written any more");
   database.execute(kind == Kind::kWrite ? "BEGIN IMMEDIATE" : "BEGIN");
 }
 

@@ -98,6 +98,10 @@ class Database {
   /// True once a commit failed in a way that leaves open whether it will be there after a restart. The
   /// connection then refuses every further transaction.
   bool condemned() const { return condemned_; }
+  void condemn() { condemned_ = true; }  ///< for another reason
+
+  /// Breaks off what its thread runs on it; from any thread.
+  void interrupt();
 
  private:
   friend class Transaction;

@@ -18,7 +18,7 @@ class RequestKeysTest : public testing::Test {
 
   Time now_ = Time(1000h);
   ScratchFolder scratch_;
-  StoreDatabase database_{scratch_ / "test.db", [this] { return now_; }};
+  StoreDatabase database_{scratch_ / "test.db", std::nullopt, [this] { return now_; }};
   RequestKeys keys_{database_};
 };
 

@@ -1,0 +1,75 @@
+#include "service/jobs/store_database.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <thread>
+
+#include "tests/support/scratch_folder.h"
+
+namespace volsmooth {
+namespace {
+
+using namespace std::chrono_literals;
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+class DamagedDatabaseTest : public testing::Test {
+ protected:
+  /// A store of so many rows, then a page in its middle that is none.
+  void make_damaged(int rows) {
+    StoreDatabase(file_).write([&](Database& database) {
+      database.run(
+          "INSERT INTO tombstones (id, deleted_ms) WITH RECURSIVE c(n) AS (SELECT 1 UNION ALL SELECT n + 1 "
+          "FROM c WHERE n < ?) SELECT hex(zeroblob(100)) || n, n FROM c",
+          rows);
+      return true;
+    });
+    pristine_ = scratch_.path() / "pristine.db";
+    fs::copy_file(file_, pristine_);
+    std::fstream file(file_, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(static_cast<std::streamoff>(fs::file_size(file_) / 4096 * 2 / 3 * 4096));
+    file << std::string(4096, '\x5a');
+  }
+
+  std::string refusal(StoreDatabase::CheckFirst check) {
+    try {
+      const StoreDatabase database(file_, check);
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "";
+  }
+
+  ScratchFolder scratch_;
+  const fs::path file_ = scratch_.path() / "volsmooth.db";
+  fs::path pristine_;
+};
+
+TEST_F(DamagedDatabaseTest, IsNotOpened) {
+  make_damaged(20'000);
+  EXPECT_THAT(refusal(std::nullopt), HasSubstr("restore"));
+  EXPECT_THAT(refusal(10s), HasSubstr("restore"));
+}
+
+TEST_F(DamagedDatabaseTest, StopsWritingWhenThatIsSeenOnlyLater) {
+  make_damaged(100'000);  // too many to be checked at once
+  std::atomic<int> condemned = 0;
+  {
+    StoreDatabase database(file_, 0ms);
+    database.on_condemned([&] { ++condemned; });
+    for (int tries = 0; tries < 2000 && condemned == 0; ++tries) std::this_thread::sleep_for(10ms);
+    EXPECT_EQ(condemned, 1);
+    EXPECT_THAT(database.trouble().value_or(""), HasSubstr("restore"));
+    EXPECT_THROW(database.write([](Database&) { return true; }), DatabaseError);
+  }
+  // The next start looks first, and is content with one that is whole.
+  EXPECT_THAT(refusal(0ms), HasSubstr("restore"));
+  fs::copy_file(pristine_, file_, fs::copy_options::overwrite_existing);
+  EXPECT_EQ(refusal(0ms), "");
+  EXPECT_FALSE(fs::exists(scratch_.path() / "volsmooth.db.damaged"));
+}
+
+}  // namespace
+}  // namespace volsmooth
