@@ -46,6 +46,22 @@ FileDescriptor lock(const fs::path& root) {
   return file;
 }
 
+/// With all that is missing above it, for good. False: it is there already.
+bool create_durably(const fs::path& directory) {
+  if (fs::exists(directory)) return false;
+  const fs::path above = directory.parent_path();
+  create_durably(above);
+  fs::create_directory(directory);
+  sync_path(above);
+  return true;
+}
+
+/// `path` as one that has a parent.
+fs::path whole(const fs::path& path) {
+  const fs::path normal = fs::absolute(path).lexically_normal();
+  return normal.has_filename() ? normal : normal.parent_path();
+}
+
 /// Gives `from` its name for good. When it is open whether the name would last, neither stays.
 void rename_durably(const fs::path& from, const fs::path& to) {
   fs::rename(from, to);
@@ -66,7 +82,7 @@ fs::path part_of(fs::path name) {
 FileStore::FileStore(fs::path root, std::int64_t reserved_bytes)
     : root_(std::move(root)),
       disk_(std::make_shared<DiskSpace>([where = root_] { return free_bytes_at(where); }, reserved_bytes)) {
-  if (fs::create_directories(root_)) fs::permissions(root_, fs::perms::owner_all);
+  if (create_durably(whole(root_))) fs::permissions(root_, fs::perms::owner_all);
   refuse_network_file_system(root_);
   lock_ = lock(root_);
   sweep(kTemporary, [](std::string_view) { return false; });

@@ -28,6 +28,7 @@ struct CuttableDaemon {
 /// What else happens at a cut, before the daemon's end and while it is down.
 struct Disaster {
   std::function<void()> strike = [] {}, clear = [] {};
+  bool names_get_lost = false;  ///< those whose directory was not synced
 };
 
 class Cutter {
@@ -68,9 +69,15 @@ class Cutter {
     } else {
       std::this_thread::sleep_for(std::chrono::milliseconds(random_() % 1500));
     }
+    end();
+  }
+
+  void end() {
     disaster_.strike();
-    daemon.kill();
+    cuttable_.daemon.kill();
     cuttable_.faults.disarm();
+    disaster_.clear();
+    if (disaster_.names_get_lost) cuttable_.faults.drop_unsynced_names();
   }
 
   void cut_at_call(std::int64_t most) {
@@ -80,17 +87,13 @@ class Cutter {
 
   /// The start itself is cut now and then.
   void start_again() {
-    disaster_.clear();
     if (random_() % 4 == 0) {
       cut_at_call(40);
       try {
         cuttable_.daemon.start();
       } catch (const std::runtime_error&) {
       }
-      disaster_.strike();
-      cuttable_.daemon.kill();
-      cuttable_.faults.disarm();
-      disaster_.clear();
+      end();
     }
     const auto start = std::chrono::steady_clock::now();
     cuttable_.daemon.start();

@@ -4,11 +4,13 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <cstdint>
 #include <filesystem>
 #include <new>
+#include <stdexcept>
 #include <system_error>
 
 namespace volsmooth::test {
@@ -29,6 +31,16 @@ enum FaultyCall : std::uint32_t {
 inline constexpr std::uint32_t kDiskCalls = 255;
 inline constexpr std::uint32_t kChangingCalls = kDiskCalls & ~(kOpenCall | kReadCall);
 
+/// A file or directory that got its name while the directory, on a disk that loses power, may not have it
+/// yet.
+struct UnsyncedName {
+  std::atomic<bool> synced;
+  std::array<char, 512> from, to;  ///< `from` is empty when it was made there
+};
+
+/// Which syncs a daemon with a fault would leave out; never those of the database.
+enum LostSync : std::uint32_t { kNoSync = 0, kFileSync = 1, kDirectorySync = 2 };
+
 /// What is to go wrong, in memory that the test shares with the daemon (fault_shim.cpp).
 struct FaultPlan {
   enum Action : std::uint32_t { kNothing, kFail, kKillBefore, kKillAfter };
@@ -38,6 +50,10 @@ struct FaultPlan {
   std::atomic<std::int64_t> counted;
   std::atomic<std::int64_t> first, last;  ///< n, from 1; `last` above `first`: these all fail
   std::atomic<std::int32_t> error;
+
+  std::atomic<std::uint32_t> lost_syncs;  ///< of LostSync: done to no effect
+  std::atomic<std::uint32_t> name_count;
+  std::array<UnsyncedName, 16384> names;
 };
 
 /// The test's side of a plan: a file that FAULT_PLAN names to the daemon.
@@ -65,6 +81,26 @@ class Faults {
   }
   void disarm() { plan_->action = FaultPlan::kNothing; }
   std::int64_t counted() const { return plan_->counted; }
+
+  void lose_syncs(LostSync which) { plan_->lost_syncs = which; }
+  /// With the daemon dead: what has no name for sure has none. POSIX promises a name only when its directory
+  /// was synced; ext4 and others mostly keep more.
+  void drop_unsynced_names() {
+    namespace fs = std::filesystem;
+    const std::size_t count = plan_->name_count;
+    if (count > plan_->names.size()) throw std::runtime_error("more names than the plan has room for");
+    for (std::size_t i = count; i-- > 0;) {
+      const UnsyncedName& name = plan_->names[i];
+      if (name.synced) continue;
+      std::error_code gone_already;
+      if (name.from[0] == '\0') {
+        fs::remove_all(name.to.data(), gone_already);
+      } else {
+        fs::rename(name.to.data(), name.from.data(), gone_already);
+      }
+    }
+    plan_->name_count = 0;
+  }
 
  private:
   void arm(FaultPlan::Action action, std::uint32_t calls, std::int64_t first, std::int64_t last, int error) {

@@ -21,6 +21,9 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <mutex>
+#include <string>
+#include <string_view>
 
 #include "tests/proof/fault_plan.h"
 
@@ -87,6 +90,65 @@ Result planned(std::uint32_t kind, bool concerned, Result failure, const Call& c
   return result;
 }
 
+/// Of an open file.
+std::string path_of(int file) {
+  std::array<char, 512> path{};
+  const ssize_t length =
+      ::readlink(("/proc/self/fd/" + std::to_string(file)).c_str(), path.data(), path.size() - 1);
+  return {path.data(), length > 0 ? static_cast<std::size_t>(length) : 0};
+}
+
+void note_name(const char* from, const char* to) {
+  if (plan == nullptr) return;
+  const std::size_t index = plan->name_count;
+  if (index >= plan->names.size()) {
+    plan->name_count = static_cast<std::uint32_t>(plan->names.size() + 1);
+    return;
+  }
+  UnsyncedName& name = plan->names[index];
+  std::snprintf(name.from.data(), name.from.size(), "%s", from);
+  std::snprintf(name.to.data(), name.to.size(), "%s", to);
+  name.synced = false;
+  ++plan->name_count;
+}
+
+std::mutex naming;
+
+/// Does what may give a file its name, and notes that when it did.
+template <class Call>
+auto naming_new(const char* path, bool concerned, const Call& call) {
+  struct stat found {};
+  if (!concerned || path[0] != '/' || ::lstat(path, &found) == 0) return call();
+  const std::lock_guard lock(naming);
+  const auto result = call();
+  if (::lstat(path, &found) == 0) note_name("", path);
+  return result;
+}
+
+/// The names in a directory are there for good.
+void note_synced(const std::string& folder) {
+  const std::lock_guard lock(naming);
+  for (std::size_t i = 0; i < plan->name_count && i < plan->names.size(); ++i) {
+    const std::string_view path = plan->names[i].to.data();
+    if (path.substr(0, path.rfind('/')) == folder) plan->names[i].synced = true;
+  }
+}
+
+template <class Call>
+int planned_sync(int file, const Call& call) {
+  if (plan == nullptr) return call();
+  struct stat found {};
+  ::fstat(file, &found);
+  const bool is_folder = S_ISDIR(found.st_mode);
+  const std::string path = path_of(file);
+  const bool is_database = path.find("volsmooth.db") != std::string::npos;
+  const bool lost =
+      is_inside(file) && !is_database && (plan->lost_syncs & (is_folder ? kDirectorySync : kFileSync));
+  const int result = planned(kSyncCall, is_inside(file), -1, [&] { return lost ? 0 : call(); });
+  if (result == 0 && is_folder && !lost) note_synced(path);
+  return result;
+}
+
 int mode_of(int flags, std::va_list arguments) {
   return flags & (O_CREAT | O_TMPFILE) ? va_arg(arguments, int) : 0;
 }
@@ -103,7 +165,10 @@ extern "C" {
     const int mode = mode_of(flags, arguments);                                                 \
     va_end(arguments);                                                                          \
     const bool is_in = is_inside(path);                                                         \
-    return note(planned(kOpenCall, is_in, -1, [&] { return real(path, flags, mode); }), is_in); \
+    const auto open_it = [&] { return real(path, flags, mode); };                               \
+    return note(planned(kOpenCall, is_in, -1,                                                   \
+                        [&] { return naming_new(path, is_in && (flags & O_CREAT), open_it); }), \
+                is_in);                                                                         \
   }
 VOLSMOOTH_OPEN(open)
 VOLSMOOTH_OPEN(open64)
@@ -121,13 +186,15 @@ VOLSMOOTH_OPEN(open64)
 VOLSMOOTH_OPENAT(openat)
 VOLSMOOTH_OPENAT(openat64)
 
-#define VOLSMOOTH_FOPEN(name)                                                                              \
-  FILE* name(const char* path, const char* mode) {                                                         \
-    static const auto real = next<FILE*(const char*, const char*)>(#name);                                 \
-    const bool is_in = is_inside(path);                                                                    \
-    FILE* file = planned(kOpenCall, is_in, static_cast<FILE*>(nullptr), [&] { return real(path, mode); }); \
-    if (file != nullptr) note(::fileno(file), is_in);                                                      \
-    return file;                                                                                           \
+#define VOLSMOOTH_FOPEN(name)                                               \
+  FILE* name(const char* path, const char* mode) {                          \
+    static const auto real = next<FILE*(const char*, const char*)>(#name);  \
+    const bool is_in = is_inside(path);                                     \
+    const auto open_it = [&] { return real(path, mode); };                  \
+    FILE* file = planned(kOpenCall, is_in, static_cast<FILE*>(nullptr),     \
+                         [&] { return naming_new(path, is_in, open_it); }); \
+    if (file != nullptr) note(::fileno(file), is_in);                       \
+    return file;                                                            \
   }
 VOLSMOOTH_FOPEN(fopen)
 VOLSMOOTH_FOPEN(fopen64)
@@ -157,8 +224,14 @@ VOLSMOOTH_ON_FILE(kReadCall, ssize_t, pread, (int file, void* bytes, size_t coun
                   (file, bytes, count, at))
 VOLSMOOTH_ON_FILE(kReadCall, ssize_t, pread64, (int file, void* bytes, size_t count, off64_t at),
                   (file, bytes, count, at))
-VOLSMOOTH_ON_FILE(kSyncCall, int, fsync, (int file), (file))
-VOLSMOOTH_ON_FILE(kSyncCall, int, fdatasync, (int file), (file))
+int fsync(int file) {
+  static const auto real = next<int(int)>("fsync");
+  return planned_sync(file, [&] { return real(file); });
+}
+int fdatasync(int file) {
+  static const auto real = next<int(int)>("fdatasync");
+  return planned_sync(file, [&] { return real(file); });
+}
 VOLSMOOTH_ON_FILE(kTruncateCall, int, ftruncate, (int file, off_t size), (file, size))
 VOLSMOOTH_ON_FILE(kTruncateCall, int, ftruncate64, (int file, off64_t size), (file, size))
 
@@ -167,8 +240,23 @@ VOLSMOOTH_ON_FILE(kTruncateCall, int, ftruncate64, (int file, off64_t size), (fi
     static const auto real = next<int parameters>(#name);                \
     return planned(kind, concerned, -1, [&] { return real arguments; }); \
   }
-VOLSMOOTH_ON_PATH(kRenameCall, rename, (const char* from, const char* to), (from, to), is_inside(from))
-VOLSMOOTH_ON_PATH(kMakeDirectoryCall, mkdir, (const char* path, mode_t mode), (path, mode), is_inside(path))
+int rename(const char* from, const char* to) {
+  static const auto real = next<int(const char*, const char*)>("rename");
+  const bool is_in = is_inside(from);
+  return planned(kRenameCall, is_in, -1, [&] {
+    if (!is_in) return real(from, to);
+    const std::lock_guard lock(naming);
+    const int result = real(from, to);
+    if (result == 0) note_name(from, to);
+    return result;
+  });
+}
+int mkdir(const char* path, mode_t mode) {
+  static const auto real = next<int(const char*, mode_t)>("mkdir");
+  const bool is_in = is_inside(path);
+  return planned(kMakeDirectoryCall, is_in, -1,
+                 [&] { return naming_new(path, is_in, [&] { return real(path, mode); }); });
+}
 VOLSMOOTH_ON_PATH(kRemoveCall, unlink, (const char* path), (path), is_inside(path))
 VOLSMOOTH_ON_PATH(kRemoveCall, unlinkat, (int at, const char* path, int flags), (at, path, flags),
                   is_inside(path, at))

@@ -1,6 +1,8 @@
-// proof_power SHIM [CUTS [JOBS]]: the data directory lies on an ext4 file system in a file, whose device goes
-// away in the middle of the work like at a power cut: what was not synced is gone. Nothing that was
-// acknowledged may be lost, doubled or changed. Ends with 77 where file systems cannot be mounted.
+// proof_power SHIM [CUTS [JOBS [files|folders]]]: the data directory lies on an ext4 file system in a file,
+// whose device goes away in the middle of the work like at a power cut: what was not synced is gone, also
+// names in directories that were not, which ext4 would mostly keep. Nothing that was acknowledged may be
+// lost, doubled or changed. With the last argument the daemon's syncs of these do nothing, and that must be
+// found. Ends with 77 where file systems cannot be mounted.
 #include <sys/ioctl.h>
 
 #include "tests/proof/cuts.h"
@@ -58,7 +60,10 @@ int main(int argc, char** argv) {
     std::puts("skipped: mounting a file system needs privileges that are missing here");
     return 77;
   }
+  const std::string lost = argc > 4 ? argv[4] : "";
   CuttableDaemon cuttable(argv[1], disk.folder() / "data");
-  Cutter cutter(cuttable, {[&] { disk.cut_power(); }, [&] { disk.power_on(); }});
-  return cutter.run(cuts, jobs) == 0 ? 0 : 1;
+  cuttable.faults.lose_syncs(lost == "files" ? kFileSync : lost == "folders" ? kDirectorySync : kNoSync);
+  Cutter cutter(cuttable, {[&] { disk.cut_power(); }, [&] { disk.power_on(); }, true});
+  const bool found = cutter.run(cuts, jobs) > 0;
+  return found == lost.empty() ? 1 : 0;
 }

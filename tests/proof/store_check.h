@@ -14,8 +14,17 @@
 
 namespace volsmooth::test {
 
+/// What `volsmoothd audit verify` says against it.
+inline std::string fault_of_audit(const std::filesystem::path& data) {
+  const TemporaryDirectory folder;
+  ChildProcess verifying({VOLSMOOTHD, "audit", "verify", "--data", data.string()}, folder / "out",
+                         folder / "err");
+  return verifying.wait() == 0 ? "" : content_of(folder / "err");
+}
+
 /// What is wrong between the rows and the files of a data directory that no daemon has open: a damaged
-/// database, files that nobody refers to, files that are missing or have other bytes than their row says.
+/// database, files that nobody refers to, files that are missing or have other bytes than their row or their
+/// record says, a broken audit.
 inline std::vector<std::string> faults_of_store(const std::filesystem::path& data) {
   namespace fs = std::filesystem;
   std::vector<std::string> faults;
@@ -45,6 +54,22 @@ inline std::vector<std::string> faults_of_store(const std::filesystem::path& dat
       "SELECT 'results/' || jobs.id || '.' || attempt || '/' || name, sha256 FROM results JOIN jobs ON job = "
       "sequence",
       [&](const auto& text) { sums[text(0)] = text(1); });
+  auto unrecorded = sums;
+  rows("SELECT name, bytes, sha256, damaged FROM stored_files", [&](const auto& text) {
+    const std::string name = text(0);
+    if (text(3) != "0") faults.push_back(name + " is on record as damaged");
+    std::error_code missing;
+    if (std::to_string(fs::file_size(data / name, missing)) != text(1))
+      faults.push_back(name + " has another size than its record says");
+    const auto known = unrecorded.find(name);
+    if (known == unrecorded.end())
+      faults.push_back(name + " is on record for nobody");
+    else if (known->second != text(2))
+      faults.push_back(name + " has another sum on record than in its row");
+    else
+      unrecorded.erase(known);
+  });
+  for (const auto& [name, sum] : unrecorded) faults.push_back(name + " is not on record");
   sqlite3_close(database);
 
   std::set<std::string> found;
@@ -64,6 +89,7 @@ inline std::vector<std::string> faults_of_store(const std::filesystem::path& dat
     }
   for (const auto& [name, sum] : sums)
     if (!found.contains(name)) faults.push_back(name + " is not there");
+  if (const std::string fault = fault_of_audit(data); !fault.empty()) faults.push_back("audit: " + fault);
   return faults;
 }
 

@@ -160,14 +160,14 @@ class Workload {
   }
 
   void look_at(const ServiceClient& service, int number, const Made& made,
-               std::map<std::string, std::string>& ids) {
+               std::map<std::string, std::string>& ids) try {
     const std::string label = std::to_string(number);
     if (made.deleted) {
       for (const std::string& target : {"/v1/jobs/" + made.job, "/v1/volumes/" + made.volume})
         if (service.call("GET", target).status != 410) find(target + " is there though it was deleted");
       return;
     }
-    if (ids[label] != made.job) find("job " + made.job + " is lost");
+    if (ids[label] != made.job) return find("job " + made.job + " is lost");
     ids.erase(label);
     const json job = service.job(made.job);
     if (job.at("state") != "succeeded") return find(job.dump());
@@ -178,6 +178,8 @@ class Workload {
         find("wrong bytes of " + result.dump());
     if (service.call("GET", "/v1/volumes/" + made.volume + "/content").body != file_of(number % kVariants))
       find("wrong bytes of " + made.volume);
+  } catch (const std::runtime_error& error) {
+    find("job " + made.job + ": " + error.what());
   }
 
   void find(const std::string& what) {
