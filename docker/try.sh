@@ -67,11 +67,11 @@ wait_until_healthy() {
   die "the container did not become healthy within a minute; its log is above"
 }
 
-# status HOST: the HTTP status of the published port for a request with this Host header.
+# status HOST [TARGET]: the HTTP status of the published port for a request with this Host header.
 status() {
   local _ code
   exec 3<>"/dev/tcp/127.0.0.1/$port" || die "nothing listens on the published port $port"
-  printf 'GET /healthz HTTP/1.1\r\nHost: %s\r\nConnection: close\r\n\r\n' "$1" >&3
+  printf 'GET %s HTTP/1.1\r\nHost: %s\r\nConnection: close\r\n\r\n' "${2:-/healthz}" "$1" >&3
   read -r _ code _ <&3
   exec 3>&-
   echo "$code"
@@ -80,6 +80,24 @@ status() {
 client() {
   "${engine[@]}" run --rm "${limits[@]}" "${locked[@]}" --network "container:$container" --user "$user" \
     --volume "$work:/work:z" --workdir /work --entrypoint volsmooth "$image" "$@" --server http://127.0.0.1:8742
+}
+
+run_daemon() {
+  "${engine[@]}" run --detach --name "$container" "${limits[@]}" "${locked[@]}" --volume "$container:/data" \
+    --publish 127.0.0.1::8742 "$image" >/dev/null || die "the container did not start; the line above says why"
+  serving
+}
+
+serving() {
+  wait_until_healthy
+  port=$("${engine[@]}" port "$container" 8742/tcp | sed -n '1s/.*://p')
+}
+
+# refuse_strangers WHEN: nobody is let in without a token.
+refuse_strangers() {
+  local code
+  code=$(status "127.0.0.1:$port" /v1/volumes)
+  [[ $code == 401 ]] || die "a caller without a token got $code $1; 401 it was to be"
 }
 
 # number FILE OFFSET: the little-endian 32-bit number at this place.
@@ -128,30 +146,38 @@ fi
 # --- At work
 
 say "running it: read-only, without capabilities, on a port of this machine only"
-"${engine[@]}" run --detach --name "$container" "${limits[@]}" "${locked[@]}" --volume "$container:/data" \
-  --publish 127.0.0.1::8742 "$image" >/dev/null || die "the container did not start; the line above says why"
-wait_until_healthy
-port=$("${engine[@]}" port "$container" 8742/tcp | sed -n '1s/.*://p')
+run_daemon
 [[ $(status "127.0.0.1:$port") == 200 ]] || die "the published port 127.0.0.1:$port did not answer /healthz with 200"
 [[ $(status elsewhere.example) == 4?? ]] || die "a foreign Host header was served; it is to be refused"
+refuse_strangers "before there is a token"
+"${engine[@]}" exec "$container" volsmoothd token create --name try --scope read,submit >"$work/token" ||
+  die "no token could be made; the line above says why"
 
 label=$("${engine[@]}" image inspect --format '{{index .Config.Labels "org.opencontainers.image.version"}}' "$image")
 [[ $(client --version) == *" $label" ]] ||
   die "docker/Dockerfile labels the image $label, but it holds $(client --version): set its label"
 
 say "smoothing $head_file"
-client smooth ch2.nii.gz -o out --method compare --feature-radius 2mm --isovalue 40,90 --mesh stl,glb ||
+client smooth ch2.nii.gz -o out --token-file token --method compare --feature-radius 2mm --isovalue 40,90 --mesh stl,glb ||
   die "the client failed in the container; its line above says why"
 check_files
 
 say "stopping it and starting it again: what it holds is in the volume"
-kept=$(client upload ch2.nii.gz --json | sed -n 's/.*"id": *"\([^"]*\)".*/\1/p')
+kept=$(client upload ch2.nii.gz --token-file token --json | sed -n 's/.*"id": *"\([^"]*\)".*/\1/p')
 "${engine[@]}" stop -t 30 "$container" >/dev/null
 ended=$("${engine[@]}" inspect --format '{{.State.ExitCode}}' "$container")
 ((ended == 0)) || die "SIGTERM was to end the daemon with 0, not $ended"
 "${engine[@]}" start "$container" >/dev/null
-wait_until_healthy
-[[ -n $kept && $(client volumes) == *"$kept"* ]] || die "the volume uploaded before the restart is gone"
+serving
+[[ -n $kept && $(client volumes --token-file token) == *"$kept"* ]] ||
+  die "the volume uploaded before the restart is gone"
+refuse_strangers "after the restart"
+
+say "losing its volume: nobody is let in for that"
+"${engine[@]}" rm --force "$container" >/dev/null
+"${engine[@]}" volume rm "$container" >/dev/null
+run_daemon
+refuse_strangers "when the volume was lost"
 
 say "all is well"
 printf '%s files, image %s, %s MB\n' "$(find "$work/out" -type f | wc -l)" "$image" \
