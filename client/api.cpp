@@ -101,8 +101,8 @@ Expected<nlohmann::json> Api::upload_body(const Descriptor& descriptor, std::int
                    .idempotency_key = new_idempotency_key()});
 }
 
-Expected<nlohmann::json> Api::volumes() {
-  return document({.target = "/v1/volumes"});
+Expected<nlohmann::json> Api::volumes(const Query& filter) {
+  return document({.target = target_of("/v1/volumes", filter)});
 }
 
 Expected<nlohmann::json> Api::volume(std::string_view id) {

@@ -28,7 +28,7 @@ class Api {
   Expected<Json> methods();
   /// A folder is packed first (packed_folder.h).
   Expected<Json> upload(const std::filesystem::path& input, const Query& options, const Sent& on_sent);
-  Expected<Json> volumes();
+  Expected<Json> volumes(const Query& filter);
   Expected<Json> volume(std::string_view id);
   Expected<void> delete_volume(std::string_view id);
 

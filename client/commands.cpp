@@ -36,8 +36,8 @@ Expected<void> upload(const Options& options, const Session& session) {
   return print(session, upload_volume(session, options.inputs.front(), options.query), id_text);
 }
 
-Expected<void> volumes(const Options&, const Session& session) {
-  return print(session, session.api.volumes(), volumes_text);
+Expected<void> volumes(const Options& options, const Session& session) {
+  return print(session, session.api.volumes(options.query), volumes_text);
 }
 
 Expected<void> submit(const Options& options, const Session& session) {

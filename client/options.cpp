@@ -141,7 +141,9 @@ void add_volume_commands(CLI::App& app, Options& options) {
       ->required()
       ->expected(1);
   add_upload_options(upload, options);
-  app.add_subcommand("volumes", "List the volumes on the server");
+  auto& volumes = *app.add_subcommand("volumes", "List the volumes on the server, newest first");
+  add_query(volumes, options, "--limit", "limit", "At most so many")->check(CLI::PositiveNumber);
+  add_query(volumes, options, "--cursor", "cursor", "Go on where an earlier list ended");
 }
 
 void add_job_commands(CLI::App& app, Options& options) {

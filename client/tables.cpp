@@ -24,6 +24,12 @@ std::vector<Row> members(const Json& document, std::initializer_list<const char*
   return rows;
 }
 
+/// How the next page is asked for; empty on the last one.
+std::string more_text(const Json& page) {
+  const std::string cursor = member_text(page, "next_cursor");
+  return cursor.empty() ? "" : "more with --cursor " + cursor + '\n';
+}
+
 }  // namespace
 
 std::string table_text(const std::vector<Row>& rows) {
@@ -53,7 +59,7 @@ std::string volumes_text(const Json& document) {
                     member_text(volume, "spacing_mm"), member_text(volume, "voxel_type"),
                     member_text(volume, "bytes"), member_text(volume, "created_at")});
   }
-  return table_text(rows);
+  return table_text(rows) + more_text(document);
 }
 
 std::string jobs_text(const Json& document) {
@@ -62,8 +68,7 @@ std::string jobs_text(const Json& document) {
     rows.push_back({member_text(job, "id"), member_text(job, "state"), percent(job),
                     member_text(job, "method"), member_text(job, "created_at"), member_text(job, "label")});
   }
-  const std::string cursor = member_text(document, "next_cursor");
-  return table_text(rows) + (cursor.empty() ? "" : "more with --cursor " + cursor + '\n');
+  return table_text(rows) + more_text(document);
 }
 
 std::string job_text(const Json& job) {

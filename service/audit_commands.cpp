@@ -5,11 +5,10 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "service/control/control_socket.h"
+#include "service/commands.h"
 #include "service/jobs/audit_seal.h"
 #include "service/jobs/job_json.h"
 #include "service/jobs/store_database.h"
-#include "service/storage/file_store.h"
 
 namespace volsmooth {
 namespace {
@@ -40,20 +39,6 @@ json document_of(const AuditRow& row) {
           {"object", row.entry.object}, {"outcome", row.entry.outcome}, {"hash", row.hash}};
 }
 
-/// By the daemon when one holds the folder.
-void audit_the_export(const std::filesystem::path& data_dir) {
-  if (const auto answer = ask_daemon(data_dir, json{{"command", "audit exported"}}.dump())) {
-    if (json::parse(*answer).contains("problem"))
-      throw std::runtime_error("the daemon could not audit the export; see its log");
-    return;
-  }
-  const FileStore files(data_dir);  // holds it for this process
-  StoreDatabase(files.path_of("volsmooth.db")).write([](Database& database) {
-    audit(database, "audit", "audit exported");
-    return true;
-  });
-}
-
 }  // namespace
 
 AuditCommands::AuditCommands(CLI::App& app) {
@@ -74,7 +59,7 @@ bool AuditCommands::asked() const {
 int AuditCommands::run(const std::filesystem::path& data_dir) const {
   const auto file = database_in(data_dir);
   if (verify_->parsed()) return verify(data_dir);
-  audit_the_export(data_dir);
+  audit_command(data_dir, "audit exported", "audit");
   Database database(file, Database::Access::kReader);
   for_each_audit_row(database, [](const AuditRow& row) { std::cout << document_of(row).dump() << '\n'; });
   return 0;

@@ -1,12 +1,17 @@
 #include "service/backup_commands.h"
 
+#include <unistd.h>
+
+#include <functional>
 #include <iostream>
 #include <set>
 #include <stdexcept>
 
+#include "service/commands.h"
 #include "service/jobs/audit_seal.h"
 #include "service/jobs/store_database.h"
 #include "service/jobs/stored_files.h"
+#include "service/jobs/tokens.h"
 #include "service/storage/digest.h"
 
 namespace volsmooth {
@@ -27,9 +32,12 @@ void make_empty_folder(const fs::path& folder) {
   fs::permissions(folder, fs::perms::owner_all);
 }
 
+void require_database(const fs::path& folder) {
+  if (!fs::exists(folder / kDatabase)) throw std::runtime_error("there is no database in " + folder.string());
+}
+
 /// One state of the database, whatever is written to it meanwhile.
 void copy_database(const fs::path& from, const fs::path& to) {
-  if (!fs::exists(from)) throw std::runtime_error("there is no database in " + from.parent_path().string());
   Database source(from, Database::Access::kReader);
   source.execute("PRAGMA query_only = OFF");  // the connection itself cannot write to the source
   source.query("VACUUM INTO ?", to.string()).step();
@@ -85,10 +93,14 @@ struct Copied {
   std::vector<std::string> damaged;  ///< or missing
 };
 
-Copied copy_store(const fs::path& from, const fs::path& to) {
+/// `adapt` is given the copied database before anything else is copied.
+Copied copy_store(
+    const fs::path& from, const fs::path& to,
+    const std::function<void(const fs::path&)>& adapt = [](const fs::path&) {}) {
   if (fs::exists(to) && fs::equivalent(from, to)) throw std::runtime_error("both are the same folder");
   make_empty_folder(to);
   copy_database(from / kDatabase, to / kDatabase);
+  adapt(to / kDatabase);
   Copied copied;
   {
     Database live(from / kDatabase, Database::Access::kReader),
@@ -126,6 +138,26 @@ Copied copy_store(const fs::path& from, const fs::path& to) {
   return copied;
 }
 
+/// Says in the audit that it was restored. Tokens may have been revoked, or made, since the backup: none of
+/// its own holds any more, unless they are to be kept.
+void take_over(const fs::path& database_file, bool keep_tokens) {
+  const ActingFor user(user_of_this_machine(::geteuid()));
+  StoreDatabase database(database_file);
+  database.write([](Database& writer) {
+    audit(writer, "store", "restored from a backup");
+    return true;
+  });
+  Tokens tokens(database);
+  if (!tokens.needed())
+    std::cerr << "volsmoothd: the backup knows of no token: until one is made, or --require-tokens is given, "
+                 "everyone who reaches the daemon is let in\n";
+  if (keep_tokens) return;
+  if (const int revoked = tokens.revoke_all(); revoked > 0)
+    std::cerr << "volsmoothd: " << revoked
+              << " tokens were revoked, since that may have been done after the backup was made: make new "
+                 "ones (token create), or restore with --keep-tokens\n";
+}
+
 }  // namespace
 
 BackupCommands::BackupCommands(CLI::App& app)
@@ -134,6 +166,8 @@ BackupCommands::BackupCommands(CLI::App& app)
   for (CLI::App* command : {backup_, restore_}) command->fallthrough();
   backup_->add_option("--to", to_, "A new or empty folder")->required();
   restore_->add_option("--from", from_, "The folder of the backup")->required();
+  restore_->add_flag("--keep-tokens", keep_tokens_,
+                     "Lets the tokens of the backup hold, also those that were revoked after it was made");
 }
 
 bool BackupCommands::asked() const {
@@ -141,7 +175,13 @@ bool BackupCommands::asked() const {
 }
 
 int BackupCommands::run(const fs::path& data_dir) const {
-  const Copied copied = backup_->parsed() ? copy_store(data_dir, to_) : copy_store(from_, data_dir);
+  const bool backs_up = backup_->parsed();
+  require_database(backs_up ? data_dir : from_);
+  if (backs_up) audit_command(data_dir, "backup begun", "store");
+  const Copied copied =
+      backs_up ? copy_store(data_dir, to_) : copy_store(from_, data_dir, [this](const fs::path& database) {
+        take_over(database, keep_tokens_);
+      });
   std::cout << copied.files << " files copied";
   if (copied.deleted > 0) std::cout << ", " << copied.deleted << " were deleted meanwhile";
   std::cout << '\n';

@@ -18,6 +18,7 @@ class BackupCommands {
  private:
   CLI::App *backup_, *restore_;
   std::filesystem::path to_, from_;
+  bool keep_tokens_ = false;
 };
 
 }  // namespace volsmooth

@@ -1,5 +1,8 @@
 #include "service/commands.h"
 
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
 #include <charconv>
 #include <iostream>
 #include <nlohmann/json.hpp>
@@ -79,6 +82,7 @@ json answer_without_daemon(const std::filesystem::path& data_dir, const json& re
   if (request.at("command") == "status") return problem("no daemon runs on this data folder");
   const FileStore files(data_dir);  // holds it for this process
   StoreDatabase database(files.path_of("volsmooth.db"));
+  const ActingFor user(user_of_this_machine(::geteuid()));
   Tokens tokens(database);
   return answer_about_tokens(tokens, request);
 }
@@ -147,17 +151,35 @@ int Commands::run(const std::filesystem::path& data_dir) const {
   return 0;
 }
 
-std::string answer_command(JobService& jobs, const std::string& text) {
+void audit_command(const std::filesystem::path& data_dir, const std::string& action,
+                   const std::string& object) {
+  const json request = {{"command", "audit"}, {"action", action}, {"object", object}};
+  if (const auto answer = ask_daemon(data_dir, request.dump())) {
+    if (json::parse(*answer).contains("problem"))
+      throw std::runtime_error("the daemon could not audit this, so it is not done; see its log");
+    return;
+  }
+  const FileStore files(data_dir);  // holds it for this process
+  const ActingFor user(user_of_this_machine(::geteuid()));
+  StoreDatabase(files.path_of("volsmooth.db")).write([&](Database& database) {
+    audit(database, object, action);
+    return true;
+  });
+}
+
+std::string answer_command(JobService& jobs, const std::string& text, uid_t user) {
   try {
+    const ActingFor on_behalf(user_of_this_machine(user));
     const json request = json::parse(text);
-    if (request.at("command") == "audit exported") {
-      jobs.audit_done({"audit exported", "audit"});
+    if (request.at("command") == "audit") {
+      jobs.audit_done({request.at("action"), request.at("object")});
       return json::object().dump();
     }
     if (request.at("command") != "status") return answer_about_tokens(jobs.tokens(), request).dump();
     const auto reason = jobs.not_ready_because();
     return (reason ? problem("not ready: " + *reason) : json{{"status", "ready"}}).dump();
-  } catch (const std::exception&) {
+  } catch (const std::exception& error) {
+    spdlog::error("a command of the user {} could not be done: {}", user, error.what());
     return problem("the daemon could not do this; see its log").dump();
   }
 }

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <sys/types.h>
+
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <optional>
@@ -27,7 +29,12 @@ class Commands {
   std::vector<std::string> scopes_;
 };
 
-/// What the daemon says to a command: the other end of its control socket.
-std::string answer_command(JobService& jobs, const std::string& request);
+/// Audits what a command of this process does with a data directory: by the daemon, when one holds it. Throws
+/// std::runtime_error.
+void audit_command(const std::filesystem::path& data_dir, const std::string& action,
+                   const std::string& object);
+
+/// What the daemon says to a command of that user: the other end of its control socket.
+std::string answer_command(JobService& jobs, const std::string& request, uid_t user);
 
 }  // namespace volsmooth

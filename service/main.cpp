@@ -193,7 +193,7 @@ void reload_tls(Server& server) {
     server.reload_tls();
     log_event("tls-reloaded", "new connections get the certificate that is there now");
   } catch (const std::runtime_error& error) {
-    log_event("tls-not-reloaded", error.what());
+    log_error("tls-not-reloaded", error.what());
   }
 }
 
@@ -208,9 +208,10 @@ void listen_for_devices(const Options& options, JobService& jobs, std::optional<
     return jobs.receive(device, name, std::move(file));
   };
   inbox.max_bytes = options.jobs.max_upload_bytes;
-  listener.emplace(DimseListener::Settings{options.dimse_listen, options.allow_open_dimse,
-                                           presets_by_title(options.presets), log_event},
-                   std::move(inbox));
+  listener.emplace(
+      DimseListener::Settings{options.dimse_listen, options.allow_open_dimse,
+                              presets_by_title(options.presets), log_event, log_warning, log_error},
+      std::move(inbox));
   log_event("dimse-ready", "listening for DICOM associations on " + listener->address());
 }
 
@@ -218,10 +219,11 @@ void listen_for_devices(const Options& options, JobService& jobs, std::optional<
 /// without.
 void listen_for_commands(const Options& options, JobService& jobs, std::optional<ControlSocket>& control) {
   try {
-    control.emplace(options.jobs.data_dir,
-                    [&jobs](const std::string& request) { return answer_command(jobs, request); });
+    control.emplace(options.jobs.data_dir, [&jobs](const std::string& request, uid_t user) {
+      return answer_command(jobs, request, user);
+    });
   } catch (const std::runtime_error& error) {
-    log_event("no-commands", error.what());
+    log_warning("no-commands", error.what());
   }
 }
 
@@ -318,7 +320,7 @@ int run(int argc, char** argv) {
   ::signal(SIGPIPE, SIG_IGN);
   start_log(options.log_level);
   for (const std::string& variable : unknown_variables(app))
-    log_event("unknown-variable", "nothing here goes by the environment's " + variable);
+    log_warning("unknown-variable", "nothing here goes by the environment's " + variable);
   try {
     serve(options);
     return 0;

@@ -76,17 +76,18 @@ std::optional<std::string> receive_all(const Descriptor& socket, std::size_t mos
   }
 }
 
-bool is_of_this_user(const Descriptor& peer) {
+/// None: nobody who may ask.
+std::optional<uid_t> user_of(const Descriptor& peer) {
   ucred who{};
   socklen_t size = sizeof who;
-  return ::getsockopt(peer.get(), SOL_SOCKET, SO_PEERCRED, &who, &size) == 0 &&
-         (who.uid == 0 || who.uid == ::geteuid());
+  if (::getsockopt(peer.get(), SOL_SOCKET, SO_PEERCRED, &who, &size) != 0) return std::nullopt;
+  if (who.uid != 0 && who.uid != ::geteuid()) return std::nullopt;
+  return who.uid;
 }
 
 }  // namespace
 
-ControlSocket::ControlSocket(const std::filesystem::path& data_dir,
-                             std::function<std::string(const std::string&)> answer)
+ControlSocket::ControlSocket(const std::filesystem::path& data_dir, Answer answer)
     : folder_(open_folder(data_dir)), answer_(std::move(answer)), socket_(new_socket()) {
   // Whoever left one there is gone: the data directory is ours.
   ::unlinkat(folder_.get(), kName, 0);
@@ -108,13 +109,17 @@ void ControlSocket::serve(const std::stop_token& stop) const {
     pollfd waiting{socket_.get(), POLLIN, 0};
     if (::poll(&waiting, 1, kLookMilliseconds) <= 0) continue;
     const Descriptor peer(::accept4(socket_.get(), nullptr, nullptr, SOCK_CLOEXEC));
-    if (peer && is_of_this_user(peer)) serve_one(peer);
+    if (!peer) {  // there is no descriptor left; who waits goes on waiting
+      std::this_thread::sleep_for(std::chrono::milliseconds(kLookMilliseconds));
+    } else if (const auto user = user_of(peer)) {
+      serve_one(peer, *user);
+    }
   }
 }
 
-void ControlSocket::serve_one(const Descriptor& peer) const {
+void ControlSocket::serve_one(const Descriptor& peer, uid_t user) const {
   set_patience(peer);
-  if (const auto request = receive_all(peer, kMaxRequestBytes)) send_all(peer, answer_(*request));
+  if (const auto request = receive_all(peer, kMaxRequestBytes)) send_all(peer, answer_(*request, user));
 }
 
 std::optional<std::string> ask_daemon(const std::filesystem::path& data_dir, const std::string& request) {

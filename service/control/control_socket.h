@@ -1,5 +1,7 @@
 #pragma once
 
+#include <sys/types.h>
+
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -14,18 +16,21 @@ namespace volsmooth {
 /// request a connection, ended by shutting down, and one answer. Only this user and root get one.
 class ControlSocket {
  public:
+  /// What is said to a request of that user of the machine.
+  using Answer = std::function<std::string(const std::string& request, uid_t user)>;
+
   /// `answer` runs on a thread of the socket's own. Throws std::runtime_error.
-  ControlSocket(const std::filesystem::path& data_dir, std::function<std::string(const std::string&)> answer);
+  ControlSocket(const std::filesystem::path& data_dir, Answer answer);
   ~ControlSocket();  ///< removes it
   ControlSocket(const ControlSocket&) = delete;
   ControlSocket& operator=(const ControlSocket&) = delete;
 
  private:
   void serve(const std::stop_token& stop) const;
-  void serve_one(const Descriptor& peer) const;
+  void serve_one(const Descriptor& peer, uid_t user) const;
 
   Descriptor folder_;  ///< sockets have names of 107 bytes at most: it is named from here
-  std::function<std::string(const std::string&)> answer_;
+  Answer answer_;
   Descriptor socket_;
   std::jthread thread_;
 };

@@ -6,10 +6,11 @@
 namespace volsmooth {
 namespace {
 
-/// The id in the path. What has not the form of one is the client's text, which has no place in the audit.
+/// The id in the path. What has not the form of one of ours is the client's text, which has no place in the
+/// audit.
 std::string object_of(const Request& request) {
   const auto id = request.path.find("id");
-  return id != request.path.end() && is_id_shaped(id->second) ? id->second : "";
+  return id != request.path.end() && has_form_of_new_id(id->second) ? id->second : "";
 }
 
 bool concerns_data(const Route& route) {

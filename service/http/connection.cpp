@@ -192,6 +192,7 @@ asio::awaitable<tl::expected<std::string_view, ReadFailure>> Connection::read_bo
   std::size_t filled = 0;
   while (!body.done() && filled < block.size()) {
     if (received.size() == 0) {
+      if (!reads_) co_return tl::unexpected(ReadFailure::kClosed);
       if (whole.expired()) co_return tl::unexpected(ReadFailure::kTimeout);
       const Deadline deadline(*this, whole.of_next_step());
       const auto [error, count] = co_await read_some(received.prepare(kReadBytes));
@@ -248,6 +249,17 @@ bool Connection::peer_has_closed() {
 void Connection::cancel() {
   error_code ignored;
   socket_.cancel(ignored);
+}
+
+void Connection::stop_reading() {
+  reads_ = false;
+  cancel();
+}
+
+void Connection::break_off() {
+  error_code ignored;
+  socket_.set_option(asio::socket_base::linger(true, 0), ignored);
+  socket_.close(ignored);
 }
 
 std::string response_head(int status, const std::vector<HeaderField>& fields) {

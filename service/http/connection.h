@@ -54,6 +54,9 @@ class Connection {
   bool peer_has_closed();
   void cancel();  ///< ends the wait under way
 
+  void stop_reading();  ///< no more of a body comes: the read under way ends, and those after it
+  void break_off();     ///< at once, with what was written and has not gone out yet
+
   boost::asio::any_io_executor executor() { return socket_.get_executor(); }
 
  private:
@@ -66,6 +69,7 @@ class Connection {
   Socket socket_;
   std::unique_ptr<TlsStream> tls_;  ///< none: in the clear
   boost::asio::steady_timer timer_;
+  bool reads_ = true;
   std::unique_ptr<Codec> codec_;
 };
 

@@ -21,14 +21,16 @@ nlohmann::json document_of(const Job& job) {
   return document;
 }
 
+/// The document, or as much of it as concerns one who may bring jobs but not see what becomes of them.
+nlohmann::json document_for(const Caller& caller, const Job& job) {
+  if (caller.may(Scope::kRead)) return document_of(job);
+  return {{"id", job.id}, {"state", name_of(job.state)}};
+}
+
 nlohmann::json results_of(const Job& job) {
   auto documents = nlohmann::json::array();
   for (const auto& result : job.results) documents.push_back(to_json(result));
   return documents;
-}
-
-Response accepted(const Job& job) {
-  return created(document_of(job), 202, "/v1/jobs/" + job.id);
 }
 
 tl::expected<Job, Problem> submit_text(Api& api, Request& request) {
@@ -123,7 +125,9 @@ tl::expected<EventStream::Batch, Problem> next_events(Api& api, const Caller& ca
 }  // namespace
 
 Reply post_job(Api& api, Request& request) {
-  return (request.file ? submit_form(api, request) : submit_text(api, request)).map(accepted);
+  return (request.file ? submit_form(api, request) : submit_text(api, request)).map([&](const Job& job) {
+    return created(document_for(request.caller, job), 202, "/v1/jobs/" + job.id);
+  });
 }
 
 Reply get_jobs(Api& api, Request& request) {
@@ -174,8 +178,8 @@ Reply get_job_events(Api& api, Request& request) {
 }
 
 Reply cancel_job(Api& api, Request& request) {
-  return api.jobs.cancel(request.caller, request.path["id"]).map([](const Job& job) {
-    return json_response(document_of(job), 202);
+  return api.jobs.cancel(request.caller, request.path["id"]).map([&](const Job& job) {
+    return json_response(document_for(request.caller, job), 202);
   });
 }
 
@@ -210,8 +214,8 @@ Reply get_delivery(Api& api, Request& request) {
 }
 
 Reply deliver_again(Api& api, Request& request) {
-  return api.jobs.deliver_again(request.caller, request.path["id"]).map([](const Job& job) {
-    return json_response(document_of(job), 202);
+  return api.jobs.deliver_again(request.caller, request.path["id"]).map([&](const Job& job) {
+    return json_response(document_for(request.caller, job), 202);
   });
 }
 

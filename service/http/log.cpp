@@ -28,6 +28,10 @@ class Members : public spdlog::custom_flag_formatter {
   std::unique_ptr<custom_flag_formatter> clone() const override { return std::make_unique<Members>(); }
 };
 
+void log_at(spdlog::level::level_enum level, std::string_view event, std::string_view message) {
+  spdlog::log(level, R"("event":"{}","message":{})", event, quoted(message));
+}
+
 }  // namespace
 
 void start_log(const std::string& level) {
@@ -61,7 +65,15 @@ void log_job(const Job& job) {
 }
 
 void log_event(std::string_view event, std::string_view message) {
-  spdlog::info(R"("event":"{}","message":{})", event, quoted(message));
+  log_at(spdlog::level::info, event, message);
+}
+
+void log_warning(std::string_view event, std::string_view message) {
+  log_at(spdlog::level::warn, event, message);
+}
+
+void log_error(std::string_view event, std::string_view message) {
+  log_at(spdlog::level::err, event, message);
 }
 
 }  // namespace volsmooth

@@ -26,5 +26,7 @@ void log_request(const RequestRecord& request);
 void log_fault(std::string_view request_id, std::string_view route, std::string_view what);
 void log_job(const Job& job);
 void log_event(std::string_view event, std::string_view message);
+void log_warning(std::string_view event, std::string_view message);  ///< somebody should look at it
+void log_error(std::string_view event, std::string_view message);    ///< something does not work
 
 }  // namespace volsmooth

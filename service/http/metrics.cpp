@@ -57,6 +57,10 @@ struct Metrics::State {
   Gauge& damaged =
       gauges("volsmooth_damaged_files", "Stored files that are not what was stored; the log names them.")
           .Add({});
+  Counter& refused_handshakes =
+      family<Counter>(registry, prometheus::BuildCounter, "volsmooth_refused_handshakes_total",
+                      "TLS connections of strangers that were closed because they were too many.")
+          .Add({});
   Gauge& uploads = gauges("volsmooth_uploads_receiving", "Uploads that are being received.").Add({});
 };
 
@@ -87,6 +91,10 @@ void Metrics::stage_done(std::string_view stage, double seconds) {
 std::shared_ptr<void> Metrics::upload_begins() {
   state_->uploads.Increment();
   return {this, [](Metrics* metrics) { metrics->state_->uploads.Decrement(); }};
+}
+
+void Metrics::handshake_refused() {
+  state_->refused_handshakes.Increment();
 }
 
 std::string Metrics::text(const ServiceStatistics& now) {

@@ -34,6 +34,9 @@ std::vector<Route> make_routes() {
       {"label", "Only jobs with exactly this label."},
       {"limit", "At most this many jobs.", Kind::kInteger, 1, 500},
       {"cursor", "Continues after the page that gave this as next_cursor."}};
+  const std::vector<QueryParameter> volume_listing = {
+      {"limit", "At most this many volumes; 1,000 unless it is said.", Kind::kInteger, 1, 1000},
+      {"cursor", "Continues after the page that gave this as next_cursor."}};
   const std::vector<QueryParameter> waiting = {
       {"wait", "Seconds to wait for the job to become final before answering.", Kind::kNumber, 0, 300}};
 
@@ -51,9 +54,10 @@ std::vector<Route> make_routes() {
       {"GET",
        "/v1/volumes",
        Scope::kRead,
-       "Lists all volumes.",
+       "Lists volumes, newest first.",
        get_volumes,
-       {200, kJson, "VolumeList", "All volumes."}},
+       {200, kJson, "VolumePage", "A page of volumes."},
+       volume_listing},
       {"GET",
        "/v1/volumes/{id}",
        Scope::kRead,
@@ -78,7 +82,7 @@ std::vector<Route> make_routes() {
        Scope::kSubmit,
        "Submits a job; durable before the answer.",
        post_job,
-       {202, kJson, "Job", "The queued job."},
+       {202, kJson, "AcceptedJob", "The queued job."},
        {},
        BodyKind::kOrder,
        "JobOrder",
@@ -108,7 +112,7 @@ std::vector<Route> make_routes() {
        Scope::kSubmit,
        "Cancels a job; a final one stays as it is.",
        cancel_job,
-       {202, kJson, "Job", "The job."}},
+       {202, kJson, "AcceptedJob", "The job."}},
       {"DELETE",
        "/v1/jobs/{id}",
        Scope::kSubmit,
@@ -138,7 +142,7 @@ std::vector<Route> make_routes() {
        Scope::kSubmit,
        "Begins a failed delivery again.",
        deliver_again,
-       {202, kJson, "Job", "The job."}},
+       {202, kJson, "AcceptedJob", "The job."}},
 
       {"POST",
        "/dicomweb/{preset}/studies",

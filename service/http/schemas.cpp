@@ -80,6 +80,12 @@ const json& fixed_schemas() {
                             "type": ["string", "null"], "format": "date-time"},
         "results": {"type": "array", "items": {"$ref": "#/components/schemas/Result"}},
         "delivery": {"anyOf": [{"$ref": "#/components/schemas/Delivery"}, {"type": "null"}]}}},
+    "AcceptedJob": {
+      "description": "The job; of one who may submit but not read, its id and state alone.",
+      "anyOf": [{"$ref": "#/components/schemas/Job"},
+                {"type": "object", "required": ["id", "state"], "additionalProperties": false,
+                 "properties": {"id": {"type": "string"},
+                                "state": {"enum": ["queued", "running", "succeeded", "failed", "cancelled"]}}}]},
     "Delivery": {
       "description": "How far the DICOM outputs are on their way to the job's destination.",
       "type": "object",
@@ -106,6 +112,12 @@ const json& fixed_schemas() {
             "result": {"type": "string"},
             "state": {"enum": ["pending", "stored", "refused"]},
             "reason": {"type": ["string", "null"]}}}}}},
+    "VolumePage": {
+      "type": "object",
+      "required": ["volumes", "next_cursor"],
+      "properties": {
+        "volumes": {"type": "array", "items": {"$ref": "#/components/schemas/Volume"}},
+        "next_cursor": {"type": ["string", "null"]}}},
     "JobPage": {
       "type": "object",
       "required": ["jobs", "next_cursor"],
@@ -209,7 +221,6 @@ json document_schemas(const std::vector<MethodInfo>& methods) {
   json schemas = fixed_schemas();
   schemas["JobOrder"] = order_schema(methods);
   schemas["Problem"] = problem_schema();
-  schemas["VolumeList"] = list_of("volumes", "Volume");
   schemas["ResultList"] = list_of("results", "Result");
   schemas["MethodList"] = list_of("methods", "Method");
   return schemas;

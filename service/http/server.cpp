@@ -15,6 +15,7 @@
 #include <unordered_set>
 
 #include "service/http/ascii.h"
+#include "service/http/metrics.h"
 #include "service/http/problem_types.h"
 #include "service/http/session.h"
 #include "service/jobs/tokens.h"
@@ -129,10 +130,9 @@ struct Server::State {
     context.tls = identity_of(settings);
     for (const auto& name : settings.host_names) context.hosts.names.push_back(lowered(name));
     listen();
-    // A session that waits for news looks whether its token still holds.
     api.jobs.tokens().on_change([this] {
       asio::post(io, [this] {
-        for (Session* session : sessions) session->tell_news();
+        for (Session* session : sessions) session->tokens_changed();
       });
     });
     thread = std::jthread([this] { io.run(); });
@@ -176,10 +176,12 @@ struct Server::State {
   asio::awaitable<void> accept_all(std::shared_ptr<Acceptor> acceptor) {
     while (acceptor->is_open()) {
       auto [error, accepted] = co_await acceptor->async_accept(asio::as_tuple(asio::use_awaitable));
-      if (!error)
+      if (!error) {
         begin_guarded(Socket(std::move(accepted)));
-      else if (acceptor->is_open())
+      } else if (acceptor->is_open()) {
+        if (error == asio::error::no_descriptors) make_room();
         co_await asio::steady_timer(io, kPauseAfterAcceptFailure).async_wait(asio::use_awaitable);
+      }
     }
   }
 
@@ -194,7 +196,12 @@ struct Server::State {
 
   void begin(Socket socket) {
     if (context.stopping) return;
-    error_code ignored;
+    error_code ignored, gone;
+    const auto peer = socket.remote_endpoint(gone);
+    if (gone) return;
+    const std::string caller = address_of(*peer.data());
+    if (context.tls && context.api.jobs.tokens().needed() && !context.handshakes.admit(caller))
+      return context.api.metrics.handshake_refused();
     socket.set_option(tcp::no_delay(true), ignored);  // a Unix socket has no such option
     if (sessions.size() >= static_cast<std::size_t>(settings.max_connections) && !make_room()) {
       if (context.tls) return;  // a handshake would take what there is too little of
@@ -204,7 +211,7 @@ struct Server::State {
           ignored);
       return;
     }
-    auto session = std::make_shared<Session>(std::move(socket), context);
+    auto session = std::make_shared<Session>(std::move(socket), caller, context);
     sessions.insert(session.get());
     asio::co_spawn(io, session->run(),
                    [this, session](std::exception_ptr fault) { end(session.get(), fault); });

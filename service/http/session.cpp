@@ -10,6 +10,7 @@
 #include "service/http/idempotency.h"
 #include "service/http/metrics.h"
 #include "service/http/problem_types.h"
+#include "service/jobs/ids.h"
 
 namespace volsmooth {
 namespace {
@@ -28,8 +29,8 @@ Problem problem_of(ReadFailure failure) {
 
 }  // namespace
 
-Session::Session(Socket socket, SessionContext& context)
-    : connection_(std::move(socket), context.tls.get()), context_(context) {}
+Session::Session(Socket socket, std::string peer, SessionContext& context)
+    : connection_(std::move(socket), context.tls.get()), peer_(std::move(peer)), context_(context) {}
 
 Problem Session::fault(const Exchange& exchange, const std::exception& error) {
   const auto id = exchange.record.id;
@@ -54,6 +55,13 @@ void Session::tell_news() {
   if (wake_) wake_->wake();
 }
 
+void Session::tokens_changed() {
+  if (wake_) return tell_news();  // it looks for itself, and ends as it should
+  if (!serving_ || serving_->request.caller.token.empty() || check_current(*serving_)) return;
+  const bool answer_has_begun = serving_->record.status != 0;
+  answer_has_begun ? connection_.break_off() : connection_.stop_reading();
+}
+
 boost::asio::awaitable<void> Session::run() {
   idle_ = true;
   const bool begun = co_await connection_.begin(context_.settings.handshake_seconds);
@@ -70,10 +78,11 @@ Session::Awaitable<bool> Session::serve_one() {
   if (!begun) co_return false;
 
   Exchange exchange;
-  exchange.record.id =
-      std::to_string(context_.api.jobs.start_number()) + "-" + std::to_string(++context_.last_request);
+  exchange.record.id = new_id("r-");
   const auto start = std::chrono::steady_clock::now();
+  serving_ = &exchange;
   co_await serve(exchange);
+  serving_ = nullptr;
   if (exchange.request.file) co_await context_.bulk.run([&] { exchange.request.file.reset(); });
 
   auto& record = exchange.record;
@@ -135,6 +144,7 @@ tl::expected<void, Problem> Session::admit(Exchange& exchange) const {
   auto caller = authorize(request.head, *exchange.route, context_.api.jobs.tokens());
   if (!caller) return tl::unexpected(caller.error());
   request.caller = std::move(*caller);
+  if (!request.caller.token.empty()) context_.handshakes.know(peer_);
   request.path = std::move(match->path);
   request.query = std::move(target->query);
   if (auto checked = check_query(*exchange.route, request.query); !checked) return checked;
@@ -176,7 +186,8 @@ Session::Awaitable<void> Session::handle(Exchange& exchange, std::unique_ptr<Bod
                      : gives_files                     ? context_.bulk
                      : exchange.route->method == "GET" ? context_.reading
                                                        : context_.writing;
-  auto reply = co_await run_guarded(pool, exchange, [&] {
+  auto reply = co_await run_guarded(pool, exchange, [&]() -> Reply {
+    if (auto current = check_current(exchange); !current) return tl::unexpected(current.error());
     const ActingFor caller(actor_of(exchange));
     return exchange.route->handle(context_.api, request);
   });
@@ -219,8 +230,8 @@ Session::Awaitable<tl::expected<void, Problem>> Session::receive_body(Exchange& 
   for (;;) {
     const auto bytes = co_await connection_.read_body(
         block, exchange.route->scope ? context_.settings.body_seconds : patience_with_strangers());
-    if (!bytes) co_return tl::unexpected(problem_of(bytes.error()));
     if (auto current = check_current(exchange); !current) co_return current;
+    if (!bytes) co_return tl::unexpected(problem_of(bytes.error()));
     if (bytes->empty()) co_return tl::expected<void, Problem>();
     exchange.record.bytes_in += static_cast<std::int64_t>(bytes->size());
     auto taken = co_await run_guarded(pool, exchange, [&] { return receiver.receive(*bytes); });

@@ -8,6 +8,7 @@
 #include "service/http/body_receiver.h"
 #include "service/http/connection.h"
 #include "service/http/handlers.h"
+#include "service/http/handshake_limit.h"
 #include "service/http/host_check.h"
 #include "service/http/log.h"
 #include "service/http/refusal_rows.h"
@@ -31,19 +32,20 @@ struct SessionContext {
   ThreadPool& verifying;  ///< for handlers that were given a file: seconds
   std::shared_ptr<const TlsIdentity> tls = {};  ///< of new connections; none: they are in the clear
   RefusalRows unknown_callers = {};             ///< of those who have no right to be known
-  std::uint64_t last_request = 0;
+  HandshakeLimit handshakes = {};
   bool stopping = false;
 };
 
 /// Serves the requests of one connection, in order.
 class Session {
  public:
-  Session(Socket socket, SessionContext& context);
+  /// `peer`: who calls, for the limit of handshakes.
+  Session(Socket socket, std::string peer, SessionContext& context);
 
   boost::asio::awaitable<void> run();
 
-  /// Wakes it while it waits for news, such as that tokens have changed.
-  void tell_news();
+  /// Ends what is under way by a token that does not hold any more.
+  void tokens_changed();
 
   /// Since when it waits for a request or the rest of its head; none: it is at work.
   std::optional<std::chrono::steady_clock::time_point> waiting_since() const {
@@ -99,8 +101,12 @@ class Session {
   Awaitable<Reply> wait_for(Exchange& exchange, LongPoll& poll, Response head);
   Awaitable<bool> write(Exchange& exchange, std::string_view bytes);
 
+  void tell_news();  ///< wakes it while it waits for them
+
   Connection connection_;
+  const std::string peer_;
   SessionContext& context_;
+  const Exchange* serving_ = nullptr;
   bool idle_ = false;
   bool made_way_ = false;
   std::optional<std::chrono::steady_clock::time_point> waiting_since_ = std::chrono::steady_clock::now();

@@ -15,7 +15,8 @@ std::vector<std::string> texts_of(Statement rows) {
 }  // namespace
 
 bool ArrivalStore::add(std::string_view tenant, std::string_view preset, const FileRecord& file,
-                       const std::vector<ArrivedInstance>& instances) {
+                       const std::vector<ArrivedInstance>& instances,
+                       const std::function<void(Database&)>& also) {
   return database_.write([&](Database& database) {
     for (const ArrivedInstance& instance : instances)
       database.run(
@@ -27,6 +28,7 @@ bool ArrivalStore::add(std::string_view tenant, std::string_view preset, const F
     audit(database, preset, "instances received");
     const bool taken = database.query("SELECT 1 FROM arrivals WHERE file = ? LIMIT 1", file.name).step();
     if (taken) insert_file(database, file);
+    also(database);
     return taken;
   });
 }
@@ -60,8 +62,43 @@ std::vector<ArrivedPart> ArrivalStore::parts_of(std::string_view job_id) {
 }
 
 std::vector<std::string> ArrivalStore::forget(std::string_view job_id) {
-  auto files = database_.write([&](Database& database) { return forget_arrivals(database, job_id); });
+  auto files =
+      database_.write_at_any_rate([&](Database& database) { return forget_arrivals(database, job_id); });
   if (!files.empty()) database_.deleted_something();
+  return files;
+}
+
+std::vector<std::string> ArrivalStore::forget_waiting(Time since) {
+  struct Series {
+    std::string preset, tenant, study, series;
+  };
+  const auto waiting = [&](Database& database) {
+    return all_of(database.query("SELECT preset, tenant, study, series FROM arrivals WHERE job IS NULL "
+                                 "GROUP BY preset, tenant, study, series HAVING max(received_ms) <= ?",
+                                 milliseconds_of(since)),
+                  [](const Statement& row) {
+                    return Series{row.text(0), row.text(1), row.text(2), row.text(3)};
+                  });
+  };
+  if (database_.read([&](Database& database) { return waiting(database).empty(); })) return {};
+  auto files = database_.write_at_any_rate([&](Database& database) {
+    std::vector<std::string> nobodys;
+    for (const auto& [preset, tenant, study, series] : waiting(database)) {
+      const std::string of_series =
+          " FROM arrivals WHERE job IS NULL AND preset = ? AND tenant = ? AND study = ? AND series = ?";
+      const auto its =
+          texts_of(database.query("SELECT DISTINCT file" + of_series, preset, tenant, study, series));
+      database.run("DELETE" + of_series, preset, tenant, study, series);
+      audit(database, preset, "instances expired");
+      for (const std::string& file : its) {
+        if (database.query("SELECT 1 FROM arrivals WHERE file = ? LIMIT 1", file).step()) continue;
+        forget_file(database, file);
+        nobodys.push_back(file);
+      }
+    }
+    return nobodys;
+  });
+  database_.deleted_something();
   return files;
 }
 
@@ -86,6 +123,14 @@ std::vector<std::string> forget_arrivals(Database& database, std::string_view jo
   database.run("DELETE FROM arrivals WHERE " + of_job, job_id);
   for (const std::string& file : files) forget_file(database, file);
   return files;
+}
+
+std::int64_t bytes_of_arrivals(Database& database, std::string_view job_id) {
+  Statement row = database.query(
+      "SELECT coalesce(sum(bytes), 0) FROM arrivals WHERE job = (SELECT sequence FROM jobs WHERE id = ?)",
+      job_id);
+  row.step();
+  return row.integer(0);
 }
 
 std::string new_arrival_file() {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -25,9 +26,12 @@ class ArrivalStore {
   explicit ArrivalStore(StoreDatabase& database) : database_(database) {}
 
   /// One that waits already stays as it is, but its series is not quiet: devices send again what they had no
-  /// answer for. False: all were such, and nothing is in the file that is not in others.
-  bool add(std::string_view tenant, std::string_view preset, const FileRecord& file,
-           const std::vector<ArrivedInstance>& instances);
+  /// answer for. False: all were such, and nothing is in the file that is not in others. `also` is done in
+  /// the same transaction.
+  bool add(
+      std::string_view tenant, std::string_view preset, const FileRecord& file,
+      const std::vector<ArrivedInstance>& instances,
+      const std::function<void(Database&)>& also = [](Database&) {});
 
   /// Series of that preset of which nothing has arrived since, and whose they are: of each tenant the oldest.
   struct QuietSeries {
@@ -40,6 +44,10 @@ class ArrivalStore {
   /// `forget_arrivals`, in a transaction of its own.
   std::vector<std::string> forget(std::string_view job_id);
 
+  /// Forgets series that still wait, such as for a preset that is not in the configuration any more, and of
+  /// which nothing has come since; returns the files that are nobody's any more.
+  std::vector<std::string> forget_waiting(Time since);
+
   std::vector<std::string> files();  ///< those that a row points to
 
  private:
@@ -51,6 +59,9 @@ void hand_over(Database& database, const ArrivalStore::QuietSeries& series, std:
 
 /// Forgets the instances of a job, likewise; returns the files that are nobody's any more.
 std::vector<std::string> forget_arrivals(Database& database, std::string_view job_id);
+
+/// What a job's arrivals take; of the disk, and of what its tenant keeps.
+std::int64_t bytes_of_arrivals(Database& database, std::string_view job_id);
 
 /// A new place for an arriving file below the data directory.
 std::string new_arrival_file();

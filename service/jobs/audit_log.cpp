@@ -41,6 +41,10 @@ ActingFor::~ActingFor() {
   current_actor = std::move(before_);
 }
 
+Actor user_of_this_machine(std::uint32_t user) {
+  return {"", "uid:" + std::to_string(user), ""};
+}
+
 const Actor& acting() {
   return current_actor;
 }

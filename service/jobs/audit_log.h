@@ -17,6 +17,9 @@ struct Actor {
   std::string request;        ///< the id that the request's answer carries
 };
 
+/// A user of this machine who gave a command: "uid:1000" in the place of the token, which no token is called.
+Actor user_of_this_machine(std::uint32_t user);
+
 /// Whatever this thread does is the actor's doing, as long as this lives.
 class ActingFor {
  public:

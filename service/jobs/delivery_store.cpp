@@ -13,6 +13,13 @@ DeliveryState delivery_state_from(std::string_view name) {
   return DeliveryState::kFailed;
 }
 
+/// A name of the configuration.
+std::string destination_of(Database& database, std::string_view job_id) {
+  Statement row = database.query(
+      "SELECT destination FROM deliveries WHERE job = (SELECT sequence FROM jobs WHERE id = ?)", job_id);
+  return row.step() ? row.text(0) : std::string();
+}
+
 }  // namespace
 
 std::string_view name_of(DeliveryState state) {
@@ -42,12 +49,14 @@ std::optional<DeliveryStore::Due> DeliveryStore::next_due(Time now, const std::s
 
 void DeliveryStore::expect(std::string_view job_id, std::span<const DicomInstance> instances) {
   database_.write([&](Database& database) {
+    int new_ones = 0;
     for (const DicomInstance& instance : instances)
-      database.run(
+      new_ones += database.run(
           "INSERT OR IGNORE INTO delivered_instances (job, sop_instance_uid, sop_class_uid, result, state, "
           "reason) "
           "SELECT sequence, ?2, ?3, ?4, 'pending', '' FROM jobs WHERE id = ?1",
           job_id, instance.sop_instance_uid, instance.sop_class_uid, instance.result);
+    if (new_ones > 0) audit(database, job_id, "sending to " + destination_of(database, job_id));
     return true;
   });
 }
@@ -97,7 +106,9 @@ void DeliveryStore::finish(std::string_view job_id, const std::optional<Problem>
     std::optional<std::string> error;
     if (why) error = problem_to_stored_json(*why).dump();
     const DeliveryState state = why ? DeliveryState::kFailed : DeliveryState::kDelivered;
-    audit(database, job_id, why ? "delivery failed" : "delivered");
+    const std::string action =
+        (why ? "delivery failed to " : "delivered to ") + destination_of(database, job_id);
+    audit(database, AuditEntry{action, std::string(job_id), why ? why->slug : "done"});
     return database.run(
         "UPDATE deliveries SET state = ?2, error = ?3 WHERE job = (SELECT sequence FROM jobs WHERE id = ?1)",
         job_id, name_of(state), error);
@@ -116,7 +127,7 @@ bool DeliveryStore::retry(std::string_view job_id) {
         "UPDATE delivered_instances SET state = 'pending', reason = '' "
         "WHERE job = (SELECT sequence FROM jobs WHERE id = ?) AND state = 'refused'",
         job_id);
-    audit(database, job_id, "delivery to be tried again");
+    audit(database, job_id, "delivery to be tried again to " + destination_of(database, job_id));
     return true;
   });
 }

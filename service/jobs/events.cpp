@@ -1,5 +1,6 @@
 #include "service/jobs/events.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cstdio>
@@ -18,10 +19,19 @@ std::optional<std::int64_t> whole_number(std::string_view text) {
 
 }  // namespace
 
+EventNumber EventCounter::next() {
+  const auto microseconds =
+      std::chrono::floor<std::chrono::microseconds>(std::chrono::steady_clock::now() - began_);
+  std::int64_t last = last_, next = 0;
+  do next = std::max(last + 1, microseconds.count());
+  while (!last_.compare_exchange_weak(last, next));
+  return {start_, next};
+}
+
 std::string text_of(EventNumber number) {
   std::array<char, 48> text{};
   const int length =
-      std::snprintf(text.data(), text.size(), "%08lld-%010lld", static_cast<long long>(number.start),
+      std::snprintf(text.data(), text.size(), "%08lld-%015lld", static_cast<long long>(number.start),
                     static_cast<long long>(number.number));
   return std::string(text.data(), static_cast<std::size_t>(length));
 }

@@ -13,6 +13,7 @@ void Expiry::forget_expired() {
     if (!stopping_) remove_.job(id);
   for (const VolumeStore::Owned& volume : volumes_.expired())
     if (!stopping_) remove_.volume(volume);
+  if (!stopping_) remove_.arrivals();
   database_.forget_tombstones(database_.now() - kTombstonesKept);
   keys_.forget_old();
   database_.clear_log();

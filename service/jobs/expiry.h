@@ -10,13 +10,15 @@
 namespace volsmooth {
 
 /// Forgets what has been kept long enough: final jobs with their results, volumes that no unfinished job
-/// needs, tombstones, keys of requests. What goes leaves nothing in the database's file and its log either.
+/// needs, what devices sent and nobody took, tombstones, keys of requests. What goes leaves nothing in the
+/// database's file and its log either.
 class Expiry {
  public:
-  /// `remove_job` and `remove_volume` take one out with all its files.
+  /// Each takes out rows with their files.
   struct Removals {
     std::function<void(const std::string& id)> job;
     std::function<void(const VolumeStore::Owned& volume)> volume;
+    std::function<void()> arrivals;  ///< all that are over
   };
   Expiry(StoreDatabase& database, JobStore& jobs, VolumeStore& volumes, RequestKeys& keys, Removals remove,
          const std::atomic<bool>& stopping)

@@ -30,6 +30,12 @@ std::string new_id(std::string_view prefix) {
   return id;
 }
 
+bool has_form_of_new_id(std::string_view text) {
+  const auto dash = text.find('-');
+  return dash != std::string_view::npos && text.size() - dash - 1 == kRandomCharacters &&
+         text.find_first_not_of(kAlphabet, dash + 1) == std::string_view::npos;
+}
+
 bool is_id_shaped(std::string_view text) {
   return !text.empty() && text.size() <= kLongestId && std::ranges::all_of(text, is_id_character);
 }

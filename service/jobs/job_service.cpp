@@ -1,20 +1,13 @@
 #include "service/jobs/job_service.h"
 
 #include <algorithm>
-#include <charconv>
 
 #include "service/jobs/ids.h"
+#include "service/jobs/refused.h"
 #include "service/jobs/service_state.h"
 
 namespace volsmooth {
 namespace {
-
-std::optional<std::int64_t> sequence_from(std::string_view cursor) {
-  std::int64_t sequence = 0;
-  const auto [end, error] = std::from_chars(cursor.data(), cursor.data() + cursor.size(), sequence);
-  if (error != std::errc() || end != cursor.data() + cursor.size()) return std::nullopt;
-  return sequence;
-}
 
 tl::unexpected<Problem> too_large(std::int64_t limit_bytes) {
   return refuse("content-too-large", "An upload may hold at most " + std::to_string(limit_bytes) + " bytes.",
@@ -69,9 +62,6 @@ tl::expected<StoredVolume, Problem> JobService::keep_volume(const Caller& caller
                                                             const UploadOptions& options,
                                                             const std::optional<RequestKey>& key) {
   if (file.bytes() > state_->settings.max_upload_bytes) return too_large(state_->settings.max_upload_bytes);
-  // Of a body without a length only now is known how much it is.
-  if (auto within = state_->within_quota(caller, file.bytes()); !within)
-    return tl::unexpected(std::move(within.error()));
   StoredVolume volume;
   volume.sha256 = file.finish();
   volume.block_sums = file.block_sums();
@@ -87,7 +77,10 @@ tl::expected<StoredVolume, Problem> JobService::keep_volume(const Caller& caller
 
   state_->files.adopt(std::move(file), volume_file(volume.id));
   try {
-    state_->volumes.insert(volume, state_->remembering(key, volume.tenant, volume.id));
+    state_->volumes.insert(volume, state_->making(caller, volume.bytes, 0, key, volume.id));
+  } catch (const Refused& refused) {
+    state_->files.remove(volume_file(volume.id));
+    return tl::unexpected(refused.problem);
   } catch (...) {
     // If nobody knows whether the row is there, the next start sees, and sweeps the file if not.
     if (!state_->database.condemned()) state_->files.remove(volume_file(volume.id));
@@ -121,7 +114,12 @@ tl::expected<std::vector<ArrivedInstance>, Problem> JobService::receive(const Ca
   const FileRecord record{place, file.bytes(), sha256, file.block_sums()};
   state_->files.adopt(std::move(file), place);
   try {
-    if (!state_->arrivals.add(caller.tenant, preset, record, *instances)) state_->files.remove(place);
+    if (!state_->arrivals.add(caller.tenant, preset, record, *instances,
+                              state_->making(caller, record.bytes, 0, {}, place)))
+      state_->files.remove(place);
+  } catch (const Refused& refused) {
+    state_->files.remove(place);
+    return tl::unexpected(refused.problem);
   } catch (...) {
     if (!state_->database.condemned()) state_->files.remove(place);
     throw;
@@ -129,8 +127,14 @@ tl::expected<std::vector<ArrivedInstance>, Problem> JobService::receive(const Ca
   return instances;
 }
 
-std::vector<StoredVolume> JobService::volumes(const Caller& caller) {
-  return state_->volumes.of_tenant(caller.tenant);
+tl::expected<VolumePage, Problem> JobService::volumes(const Caller& caller, const VolumeQuery& query) {
+  const auto before = state_->place_of(caller, query.cursor);
+  if (!before) return tl::unexpected(before.error());
+  auto listed = state_->volumes.list(caller.tenant, query.limit + 1, *before);
+  VolumePage page;
+  page.next_cursor = state_->cut(caller, listed, query.limit);
+  for (auto& [volume, sequence] : listed) page.volumes.push_back(std::move(volume));
+  return page;
 }
 
 tl::expected<StoredVolume, Problem> JobService::volume(const Caller& caller, std::string_view id) {
@@ -171,7 +175,6 @@ tl::expected<Job, Problem> JobService::submit(const Caller& caller, const JobOrd
     auto made = state_->engine.plan(order, volume->facts);
     if (!made) return tl::unexpected(std::move(made.error()));
     plan = *std::move(made);
-    if (auto room = state_->room_for(caller, plan); !room) return tl::unexpected(std::move(room.error()));
   }
 
   Job job;
@@ -185,17 +188,22 @@ tl::expected<Job, Problem> JobService::submit(const Caller& caller, const JobOrd
   job.progress.stage = "queued";
   job.created_at = state_->database.now();
   job.keep = order.keep_days ? std::chrono::days(*order.keep_days) : state_->settings.keep;
-  switch (state_->jobs.insert(job, state_->queue_limits(), state_->remembering(key, job.tenant, job.id))) {
-    case JobStore::Insertion::kNoVolume:
-      return no_volume();
-    case JobStore::Insertion::kQueueFull:
-      return refuse("queue-full", "Too many jobs are waiting; try again later.",
-                    {{"limit", state_->settings.max_queued}});
-    case JobStore::Insertion::kTenantQueueFull:
-      return refuse("queue-full", "Too many of your jobs are waiting; try again when some are done.",
-                    {{"limit", state_->settings.tenant_max_queued}});
-    case JobStore::Insertion::kDone:
-      break;
+  try {
+    switch (state_->jobs.insert(job, state_->queue_limits(),
+                                state_->making(caller, 0, job.disk_bytes, key, job.id))) {
+      case JobStore::Insertion::kNoVolume:
+        return no_volume();
+      case JobStore::Insertion::kQueueFull:
+        return refuse("queue-full", "Too many jobs are waiting; try again later.",
+                      {{"limit", state_->settings.max_queued}});
+      case JobStore::Insertion::kTenantQueueFull:
+        return refuse("queue-full", "Too many of your jobs are waiting; try again when some are done.",
+                      {{"limit", state_->settings.tenant_max_queued}});
+      case JobStore::Insertion::kDone:
+        break;
+    }
+  } catch (const Refused& refused) {
+    return tl::unexpected(refused.problem);
   }
   (order.source ? state_->retrievals : state_->pool).wake();
   return job;
@@ -207,17 +215,11 @@ tl::expected<Job, Problem> JobService::job(const Caller& caller, std::string_vie
 }
 
 tl::expected<JobPage, Problem> JobService::jobs(const Caller& caller, const JobQuery& query) {
-  std::optional<std::int64_t> before;
-  if (!query.cursor.empty()) {
-    before = sequence_from(query.cursor);
-    if (!before) return refuse("bad-query", "'cursor' must be the next_cursor of the page before.");
-  }
-  auto listed = state_->jobs.list(caller.tenant, query, before);
+  const auto before = state_->place_of(caller, query.cursor);
+  if (!before) return tl::unexpected(before.error());
+  auto listed = state_->jobs.list(caller.tenant, query, *before);
   JobPage page;
-  if (std::ssize(listed) > query.limit) {
-    listed.resize(static_cast<std::size_t>(query.limit));
-    if (!listed.empty()) page.next_cursor = std::to_string(listed.back().sequence);
-  }
+  page.next_cursor = state_->cut(caller, listed, query.limit);
   for (auto& [job, sequence] : listed) page.jobs.push_back(state_->with_progress(std::move(job)));
   return page;
 }
@@ -311,10 +313,6 @@ void JobService::on_store_lost(std::function<void()> observer) {
 
 void JobService::audit_done(AuditEntry entry) {
   state_->audit_queue.record(std::move(entry));
-}
-
-std::int64_t JobService::start_number() const {
-  return state_->database.start_number();
 }
 
 void JobService::forget_expired() {

@@ -60,6 +60,16 @@ struct JobPage {
   std::string next_cursor;  ///< empty: this was the last page
 };
 
+struct VolumeQuery {
+  int limit = 1000;
+  std::string cursor = {};  ///< as given by the page before; empty: from the newest
+};
+
+struct VolumePage {
+  std::vector<StoredVolume> volumes;  ///< newest first
+  std::string next_cursor;            ///< empty: this was the last page
+};
+
 struct JobEvent {
   std::string id;  ///< opaque; later events of the same job compare later, also across restarts of the daemon
   std::string kind;  ///< "state" or "progress"
@@ -127,7 +137,7 @@ class JobService {
   tl::expected<std::vector<ArrivedInstance>, Problem> receive(const Caller& caller, std::string_view preset,
                                                               IncomingFile file);
 
-  std::vector<StoredVolume> volumes(const Caller& caller);
+  tl::expected<VolumePage, Problem> volumes(const Caller& caller, const VolumeQuery& query = {});
   tl::expected<StoredVolume, Problem> volume(const Caller& caller, std::string_view id);
   tl::expected<StoredFile, Problem> volume_content(const Caller& caller, std::string_view id);
   tl::expected<void, Problem> delete_volume(const Caller& caller, std::string_view id);
@@ -174,7 +184,6 @@ class JobService {
   void forget_expired();
 
   ServiceStatistics statistics();
-  std::int64_t start_number() const;               ///< of this start of the daemon: 1, 2, ...
   std::optional<std::string> not_ready_because();  ///< none: ready
 
  private:

@@ -148,6 +148,7 @@ void take_retrieved(Database& database, const std::string& job_id, const Retriev
       "disk_bytes = ?7 WHERE id = ?1",
       job_id, order.volume, to_json(order).dump(), to_json(retrieved.plan.parameters).dump(),
       retrieved.plan.memory_bytes, retrieved.plan.is_long, retrieved.plan.disk_bytes);
+  retrieved.also(database);
 }
 
 constexpr std::string_view kCountQueued = "SELECT count(*) FROM jobs WHERE state = 'queued'";
@@ -254,27 +255,9 @@ std::optional<Job> JobStore::claim(std::int64_t most_memory_bytes, Work work, bo
   });
 }
 
-std::int64_t JobStore::bytes_of_tenant(std::string_view tenant) {
-  return database_.read([&](Database& database) {
-    Statement row = database.query(
-        "SELECT coalesce((SELECT bytes FROM usage WHERE tenant = ?1), 0) + "
-        "(SELECT coalesce(sum(disk_bytes), 0) FROM jobs WHERE tenant = ?1 AND state IN ('queued', "
-        "'running'))",
-        tenant);
-    row.step();
-    return row.integer(0);
-  });
-}
-
-std::int64_t JobStore::disk_bytes_of_unfinished() {
-  return database_.read([](Database& database) {
-    return count(database,
-                 "SELECT coalesce(sum(disk_bytes), 0) FROM jobs WHERE state IN ('queued', 'running')");
-  });
-}
-
 bool JobStore::change(const JobChange& change) {
-  return database_.write([&](Database& database) { return change_in(database, change); });
+  const auto step = [&](Database& database) { return change_in(database, change); };
+  return is_final(change.to) ? database_.write_at_any_rate(step) : database_.write(step);
 }
 
 bool JobStore::change_in(Database& database, const JobChange& change) {
@@ -314,7 +297,7 @@ bool JobStore::change_in(Database& database, const JobChange& change) {
 }
 
 bool JobStore::request_cancel(std::string_view id) {
-  return database_.write([&](Database& database) {
+  return database_.write_at_any_rate([&](Database& database) {
     const bool requested =
         database.run("UPDATE jobs SET cancel_requested = 1 WHERE id = ? AND state = 'running'", id) > 0;
     if (requested) audit(database, id, "job cancel requested");
@@ -331,7 +314,7 @@ bool JobStore::is_wanted(std::string_view id) {
 std::optional<JobStore::Removal> JobStore::remove(std::string_view id,
                                                   const std::function<bool(const Job&)>& is_wanted,
                                                   Burial reason) {
-  auto removal = database_.write([&](Database& database) -> std::optional<Removal> {
+  auto removal = database_.write_at_any_rate([&](Database& database) -> std::optional<Removal> {
     std::optional<Job> job = find_in(database, id);
     if (!job) return std::nullopt;
     const bool was_final = is_final(job->state);
@@ -403,6 +386,19 @@ ServiceStatistics JobStore::statistics() {
     found.damaged_files = count(database, "SELECT count(*) FROM stored_files WHERE damaged = 1");
     return found;
   });
+}
+
+std::int64_t bytes_of_tenant(Database& database, std::string_view tenant) {
+  return count(database,
+               "SELECT coalesce((SELECT bytes FROM usage WHERE tenant = ?1), 0) + "
+               "(SELECT coalesce(sum(disk_bytes), 0) FROM jobs WHERE tenant = ?1 AND state IN ('queued', "
+               "'running'))",
+               tenant);
+}
+
+std::int64_t disk_bytes_of_unfinished(Database& database) {
+  return count(database,
+               "SELECT coalesce(sum(disk_bytes), 0) FROM jobs WHERE state IN ('queued', 'running')");
 }
 
 std::string results_directory(const Job& job) {

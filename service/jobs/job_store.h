@@ -18,6 +18,7 @@ namespace volsmooth {
 struct Retrieved {
   StoredVolume volume;
   JobPlan plan;
+  std::function<void(Database&)> also = [](Database&) {};  ///< in the same transaction; may throw Refused
 };
 
 /// One step in a job's life and what becomes known with it.
@@ -48,7 +49,7 @@ class JobStore {
   struct QueueLimits {
     int all, of_tenant;
   };
-  /// `also` is done in the same transaction, with the job there.
+  /// `also` is done in the same transaction, with the job there; may throw Refused.
   Insertion insert(
       const Job& job, QueueLimits limits, const std::function<void(Database&)>& also = [](Database&) {});
 
@@ -97,10 +98,6 @@ class JobStore {
   std::set<std::string, std::less<>> results_directories();  ///< those that a succeeded job points to
 
   std::vector<NumberedEvent> events_after(std::string_view id, EventNumber after);
-  /// Of its volumes and results, and of those that its unfinished jobs may still have.
-  std::int64_t bytes_of_tenant(std::string_view tenant);
-  std::int64_t disk_bytes_of_unfinished();  ///< that their results may come to
-
   ServiceStatistics statistics();  ///< all but the free disk space
 
  private:
@@ -116,6 +113,11 @@ class JobStore {
       served_;                ///< when each tenant was, in claims; by the mutex
   std::uint64_t claims_ = 0;  ///< by the mutex
 };
+
+/// What a tenant keeps: volumes, results, what devices sent for it, and what its unfinished jobs may still
+/// come to.
+std::int64_t bytes_of_tenant(Database& database, std::string_view tenant);
+std::int64_t disk_bytes_of_unfinished(Database& database);  ///< that the results of all may come to
 
 /// Where the results of a job lie below the data directory; each attempt has a place of its own.
 std::string results_directory(const Job& job);

@@ -11,6 +11,7 @@
 #include "service/jobs/ids.h"
 #include "service/jobs/job_json.h"
 #include "service/jobs/machine.h"
+#include "service/jobs/refused.h"
 
 namespace volsmooth {
 namespace {
@@ -47,13 +48,17 @@ JobService::State::State(JobServiceSettings given, Engine computing, Pacs networ
       audit_queue(database),
       stored_files(database, files),
       tokens(database),
+      cursors(database),
       volumes(database),
       jobs(database),
       deliveries(database),
       arrivals(database),
       runner(engine, files, database, settings.threads, [this](const std::string& id) { wakes.wake(id); }),
-      source_runner(engine, pacs, files, database, settings,
-                    [this](const std::string& id) { wakes.wake(id); }),
+      source_runner(
+          engine, pacs, files, database, settings, [this](const std::string& id) { wakes.wake(id); },
+          [this](Database& writer, const std::string& tenant, std::int64_t added, std::int64_t to_come) {
+            require_room(writer, tenant, added, to_come);
+          }),
       delivery_runner(pacs, stored_files, files, database, jobs, settings,
                       [this](const std::string& id) { wakes.wake(id); }),
       keys(database),
@@ -62,6 +67,11 @@ JobService::State::State(JobServiceSettings given, Engine computing, Pacs networ
               [this](const VolumeStore::Owned& volume) {
                 if (volumes.remove(volume.tenant, volume.id, Burial::kExpired) == VolumeStore::Removal::kDone)
                   files.remove(volume_file(volume.id));
+              },
+              [this] {
+                if (settings.keep.count() == 0) return;
+                for (const std::string& file : arrivals.forget_waiting(database.now() - settings.keep))
+                  files.remove(file);
               }},
              stopping),
       scrubber(stored_files, settings.scrub_period, settings.clock, stopping),
@@ -72,8 +82,12 @@ JobService::State::State(JobServiceSettings given, Engine computing, Pacs networ
       scrubbing(1, [this] { return scrubber.claim(); }),
       forgetting(1, [this] {
         expiry.forget_expired();
+        files.lay_ballast();
         return WorkerPool::Work();
       }) {
+  files.lay_ballast();
+  database.on_full_disk([this] { return files.drop_ballast(); });
+  files.hold_back([this] { return database.read(disk_bytes_of_unfinished); });
   check_presets();
   recover();
   sweep();
@@ -233,11 +247,14 @@ std::optional<Time> JobService::State::expiry_of_volume(Time created_at) const {
   return created_at + settings.keep;
 }
 
-std::function<void(Database&)> JobService::State::remembering(const std::optional<RequestKey>& key,
-                                                              const std::string& tenant,
-                                                              const std::string& id) {
-  return [this, &key, &tenant, &id](Database& writer) {
-    if (key) remember(writer, tenant, *key, id, database.now());
+std::function<void(Database&)> JobService::State::making(const Caller& caller, std::int64_t added,
+                                                         std::int64_t to_come,
+                                                         const std::optional<RequestKey>& key,
+                                                         const std::string& id) {
+  return [this, &caller, added, to_come, &key, &id](Database& writer) {
+    tokens.require_current(caller);
+    require_room(writer, caller.tenant, added, to_come);
+    if (key) remember(writer, caller.tenant, *key, id, database.now());
   };
 }
 
@@ -279,6 +296,13 @@ tl::expected<void, Problem> JobService::State::unless_gone(const Caller& caller,
   auto reason = missing(caller, id, what);
   if (reason.value().slug == "gone") return {};
   return reason;
+}
+
+tl::expected<std::optional<std::int64_t>, Problem> JobService::State::place_of(
+    const Caller& caller, const std::string& cursor) const {
+  if (cursor.empty()) return std::nullopt;
+  if (const auto sequence = cursors.sequence_at(caller.tenant, cursor)) return sequence;
+  return refuse("bad-query", "'cursor' must be the next_cursor of the page before.");
 }
 
 Job JobService::State::with_progress(Job job) const {
@@ -336,36 +360,39 @@ tl::expected<void, Problem> JobService::State::check(const JobOrder& order) cons
   return check_parameters(order.parameters, *method);
 }
 
-std::int64_t JobService::State::unpromised_bytes() {
-  return std::max<std::int64_t>(files.available_bytes() - jobs.disk_bytes_of_unfinished(), 0);
+tl::expected<IncomingFile, Problem> JobService::State::begin_file(std::int64_t bytes) {
+  if (auto file = files.receive(bytes)) return *std::move(file);
+  const std::int64_t free = files.available_bytes() - database.read(disk_bytes_of_unfinished);
+  return refuse("insufficient-storage", "The disk has too little free space for this upload.",
+                {{"free_bytes", std::max<std::int64_t>(free, 0)}});
 }
 
-tl::expected<IncomingFile, Problem> JobService::State::begin_file(std::int64_t bytes) {
-  const std::int64_t free = unpromised_bytes();
-  if (bytes <= free)
-    if (auto file = files.receive(bytes)) return *std::move(file);
-  return refuse("insufficient-storage", "The disk has too little free space for this upload.",
-                {{"free_bytes", free}});
+tl::unexpected<Problem> JobService::State::over_quota(std::int64_t needed, std::int64_t used) const {
+  return refuse("quota",
+                "This is more than may be kept for you; delete volumes or jobs, or wait for them to expire.",
+                {{"needed_bytes", needed}, {"used_bytes", used}, {"limit_bytes", settings.tenant_max_bytes}});
 }
 
 tl::expected<void, Problem> JobService::State::within_quota(const Caller& caller, std::int64_t more_bytes) {
   if (settings.tenant_max_bytes == 0) return {};
-  const std::int64_t used = jobs.bytes_of_tenant(caller.tenant);
+  const std::int64_t used =
+      database.read([&](Database& reader) { return bytes_of_tenant(reader, caller.tenant); });
   if (used < settings.tenant_max_bytes && more_bytes <= settings.tenant_max_bytes - used) return {};
-  return refuse(
-      "quota", "This is more than may be kept for you; delete volumes or jobs, or wait for them to expire.",
-      {{"needed_bytes", more_bytes}, {"used_bytes", used}, {"limit_bytes", settings.tenant_max_bytes}});
+  return over_quota(more_bytes, used);
 }
 
-tl::expected<void, Problem> JobService::State::room_for(const Caller& caller, const JobPlan& plan) {
-  if (auto within = within_quota(caller, plan.disk_bytes); !within) return within;
-  const std::int64_t free = unpromised_bytes();
-  if (plan.disk_bytes <= free) return {};
-  return refuse(
-      "insufficient-storage",
-      "The results of this job may not fit on the disk beside those of the jobs before it; ask for less, or "
-      "try again when some were deleted.",
-      {{"estimate_bytes", plan.disk_bytes}, {"free_bytes", free}});
+void JobService::State::require_room(Database& writer, const std::string& tenant, std::int64_t added,
+                                     std::int64_t to_come) {
+  const std::int64_t kept = bytes_of_tenant(writer, tenant), needed = added + to_come;
+  if (settings.tenant_max_bytes > 0 && kept > settings.tenant_max_bytes)
+    throw Refused(over_quota(needed, kept - needed).value());
+  const std::int64_t free = files.available_bytes() - (disk_bytes_of_unfinished(writer) - to_come);
+  if (to_come > 0 && to_come > free)
+    throw Refused(
+        {"insufficient-storage",
+         "The results of this job may not fit on the disk beside those of the jobs before it; ask for "
+         "less, or try again when some were deleted.",
+         {{"estimate_bytes", to_come}, {"free_bytes", std::max<std::int64_t>(free, 0)}}});
 }
 
 tl::expected<StoredFile, Problem> JobService::State::stored_file(const std::string& name,

@@ -9,6 +9,7 @@
 #include "service/jobs/arrival_store.h"
 #include "service/jobs/audit_queue.h"
 #include "service/jobs/claimed_job.h"
+#include "service/jobs/cursors.h"
 #include "service/jobs/delivery_runner.h"
 #include "service/jobs/expiry.h"
 #include "service/jobs/job_runner.h"
@@ -56,6 +57,16 @@ struct JobService::State {
   }
 
   // Answers.
+  /// Where a page of a list begins; bad-query.
+  tl::expected<std::optional<std::int64_t>, Problem> place_of(const Caller& caller,
+                                                              const std::string& cursor) const;
+  /// Of a list that may be one too long: keeps `limit` of it, and gives the cursor of the next page.
+  template <class Listed>
+  std::string cut(const Caller& caller, std::vector<Listed>& listed, int limit) const {
+    if (std::ssize(listed) <= limit) return {};
+    listed.erase(listed.begin() + limit, listed.end());
+    return cursors.at(caller.tenant, listed.back().sequence);
+  }
   /// What the engine says of an upload; not-ready when the service is stopped meanwhile.
   tl::expected<VolumeFacts, Problem> verify(const std::filesystem::path& file,
                                             const UploadOptions& options) const;
@@ -65,19 +76,21 @@ struct JobService::State {
   tl::expected<void, Problem> unless_gone(const Caller& caller, std::string_view id, std::string_view what);
   Job with_progress(Job job) const;
   std::optional<Time> expiry_of_volume(Time created_at) const;
-  /// Remembers what a request with a key made; for the transaction that makes it.
-  std::function<void(Database&)> remembering(const std::optional<RequestKey>& key, const std::string& tenant,
-                                             const std::string& id);
+  /// For the end of the transaction in which a request makes something: throws Refused when its token holds
+  /// no more, or when the bytes that it has added and those `to_come` of a job have no room; remembers what
+  /// it has made when it has a key.
+  std::function<void(Database&)> making(const Caller& caller, std::int64_t added, std::int64_t to_come,
+                                        const std::optional<RequestKey>& key, const std::string& id);
   tl::expected<void, Problem> check(const JobOrder& order) const;
   JobStore::QueueLimits queue_limits() const { return {settings.max_queued, settings.tenant_max_queued}; }
-  std::int64_t unpromised_bytes();  ///< of the disk, beside the results of unfinished jobs
   /// A file to receive so many bytes into, on a disk that keeps room for the results of unfinished jobs.
   tl::expected<IncomingFile, Problem> begin_file(std::int64_t bytes);
+  tl::unexpected<Problem> over_quota(std::int64_t needed, std::int64_t used) const;
   /// Whether the caller's tenant may keep so much more.
   tl::expected<void, Problem> within_quota(const Caller& caller, std::int64_t more_bytes);
-  /// Whether the results of a job fit on the disk beside those of the jobs accepted before, and into the
-  /// quota.
-  tl::expected<void, Problem> room_for(const Caller& caller, const JobPlan& plan);
+  /// In a transaction that has added so much to what a tenant keeps: throws Refused when it is too much, or
+  /// when `to_come`, the results of a job, may not fit on the disk beside those of the other unfinished ones.
+  void require_room(Database& database, const std::string& tenant, std::int64_t added, std::int64_t to_come);
   tl::expected<void, Problem> check_nodes(const JobOrder& order) const;
   tl::expected<StoredFile, Problem> stored_file(const std::string& name, const std::string& media_type,
                                                 std::int64_t bytes, const std::string& sha256);
@@ -90,6 +103,7 @@ struct JobService::State {
   AuditQueue audit_queue;
   StoredFiles stored_files;
   Tokens tokens;
+  Cursors cursors;
   VolumeStore volumes;
   JobStore jobs;
   DeliveryStore deliveries;

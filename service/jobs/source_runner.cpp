@@ -8,6 +8,7 @@
 #include "service/jobs/arrival_store.h"
 #include "service/jobs/ids.h"
 #include "service/jobs/job_runner.h"
+#include "service/jobs/refused.h"
 #include "service/jobs/retry_times.h"
 
 namespace volsmooth {
@@ -29,6 +30,11 @@ NodeFailure failure_of(const std::exception& thrown) {
 
 void SourceRunner::run(ClaimedJob& claim) const {
   try {
+    // Before an archive is asked for what could not be kept.
+    database_.read([&](Database& database) {
+      require_room_(database, claim.job().tenant, 0, 0);
+      return true;
+    });
     auto file = files_.receive();
     if (!file) return fail_or_wait(claim, no_room());
     if (auto volume = retrieve(claim, *file)) {
@@ -38,6 +44,8 @@ void SourceRunner::run(ClaimedJob& claim) const {
     }
   } catch (const Cancelled&) {
     claim.end_interrupted();
+  } catch (const Refused& refused) {  // until something was deleted, or has expired
+    fail_or_wait(claim, {refused.problem, true});
   } catch (const std::exception& thrown) {
     spdlog::error("job {} attempt {}: {}", claim.job().id, claim.job().attempt, thrown.what());
     fail_or_wait(claim, failure_of(thrown));
@@ -101,7 +109,13 @@ void SourceRunner::keep(ClaimedJob& claim, StoredVolume volume, IncomingFile fil
   files_.adopt(std::move(file), place);
   bool taken = false;
   try {
-    taken = claim.continue_with({std::move(volume), *std::move(plan)});
+    const std::int64_t bytes = volume.bytes, to_come = plan->disk_bytes;
+    // What devices sent goes when its volume is there.
+    const auto check_room = [&](Database& database) {
+      const std::int64_t arrived = bytes_of_arrivals(database, claim.job().id);
+      require_room_(database, claim.job().tenant, bytes - arrived, to_come);
+    };
+    taken = claim.continue_with({std::move(volume), *std::move(plan), check_room});
   } catch (...) {
     if (!database_.condemned()) files_.remove(place);
     throw;

@@ -14,14 +14,21 @@ namespace volsmooth {
 /// step: queued again with its volume, queued again to wait for a node that is down, or failed.
 class SourceRunner {
  public:
+  /// In a transaction that has added so much to what a tenant keeps and will add `to_come`: throws Refused
+  /// when there is no room for it.
+  using RequireRoom = std::function<void(Database& database, const std::string& tenant, std::int64_t added,
+                                         std::int64_t to_come)>;
+
   SourceRunner(const Engine& engine, const Pacs& pacs, FileStore& files, StoreDatabase& database,
-               const JobServiceSettings& settings, std::function<void(const std::string& job_id)> wake)
+               const JobServiceSettings& settings, std::function<void(const std::string& job_id)> wake,
+               RequireRoom require_room)
       : engine_(engine),
         pacs_(pacs),
         files_(files),
         database_(database),
         settings_(settings),
-        wake_(std::move(wake)) {}
+        wake_(std::move(wake)),
+        require_room_(std::move(require_room)) {}
 
   void run(ClaimedJob& claim) const;
 
@@ -37,6 +44,7 @@ class SourceRunner {
   StoreDatabase& database_;
   const JobServiceSettings& settings_;
   const std::function<void(const std::string&)> wake_;
+  const RequireRoom require_room_;
 };
 
 }  // namespace volsmooth

@@ -244,9 +244,25 @@ constexpr const char* kLists = R"(
   CREATE INDEX jobs_by_tenant_label ON jobs (tenant, label, sequence);
 )";
 
+/// What devices sent counts as kept by its tenant until it is a volume. And the key of the lists' cursors.
+constexpr const char* kArrivalsCount = R"(
+  INSERT INTO usage (tenant, bytes) SELECT tenant, sum(bytes) FROM arrivals WHERE true GROUP BY tenant
+    ON CONFLICT (tenant) DO UPDATE SET bytes = bytes + excluded.bytes;
+  CREATE TRIGGER arrival_comes AFTER INSERT ON arrivals BEGIN
+    INSERT INTO usage (tenant, bytes) VALUES (new.tenant, new.bytes)
+      ON CONFLICT (tenant) DO UPDATE SET bytes = bytes + excluded.bytes;
+  END;
+  CREATE TRIGGER arrival_goes AFTER DELETE ON arrivals BEGIN
+    UPDATE usage SET bytes = bytes - old.bytes WHERE tenant = old.tenant;
+  END;
+
+  CREATE TABLE secrets (name TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT, WITHOUT ROWID;
+  INSERT INTO secrets (name, value) VALUES ('cursors', lower(hex(randomblob(32))));
+)";
+
 /// What makes each version of the schema of the one before.
 constexpr std::array kVersions = {kFirstSchema, kIndexByState, kNodes,  kLongJobs, kTenants, kStoredFiles,
-                                  kKeeping,     kAudit,        kTokens, kShares,   kLists};
+                                  kKeeping,     kAudit,        kTokens, kShares,   kLists,   kArrivalsCount};
 /// The last version in which the audit was no chain yet.
 constexpr std::size_t kUnlinkedAudit = std::ranges::find(kVersions, kAudit) - kVersions.begin();
 constexpr std::size_t kNewestVersion = kVersions.size();
@@ -367,7 +383,8 @@ void StoreDatabase::forget_tombstones(Time before) {
         return database.query("SELECT 1" + std::string(kOld) + " LIMIT 1", before_ms).step();
       }))
     return;
-  write([&](Database& database) { return database.run("DELETE" + std::string(kOld), before_ms); });
+  write_at_any_rate(
+      [&](Database& database) { return database.run("DELETE" + std::string(kOld), before_ms); });
 }
 
 void StoreDatabase::clear_log() {

@@ -59,6 +59,19 @@ class StoreDatabase {
     return result;
   }
 
+  /// The same for what ends something or makes room: on a full disk, with what `on_full_disk` frees.
+  template <class Body>
+  auto write_at_any_rate(const Body& body) {
+    try {
+      return write(body);
+    } catch (const DatabaseError& error) {
+      if (!error.is_full_disk() || !on_full_disk_()) throw;
+    }
+    return write(body);
+  }
+  /// Frees some of the disk; false: it cannot. Set before other threads use the database.
+  void on_full_disk(std::function<bool()> free) { on_full_disk_ = std::move(free); }
+
   /// To be called when something was deleted that nobody is to find any more: the next `clear_log` sees to
   /// it.
   void deleted_something() { log_holds_deleted_ = true; }
@@ -89,6 +102,7 @@ class StoreDatabase {
   AuditSeal seal_;  // written under the writer's mutex
   std::int64_t start_number_;
   Database reader_;
+  std::function<bool()> on_full_disk_ = [] { return false; };
 };
 
 // The pieces that volumes and jobs share. Those that write belong into the caller's transaction.

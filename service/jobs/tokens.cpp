@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "service/jobs/ids.h"
+#include "service/jobs/refused.h"
 #include "service/storage/digest.h"
 
 namespace volsmooth {
@@ -154,6 +155,23 @@ tl::expected<void, Problem> Tokens::revoke(std::string_view name) {
   return {};
 }
 
+int Tokens::revoke_all() {
+  const Time now = now_in_milliseconds();
+  const auto revoked = database_.write([&](Database& database) {
+    auto names = all_of(database.query("SELECT name FROM tokens WHERE revoked_ms IS NULL"),
+                        [](const Statement& row) { return row.text(0); });
+    database.run("UPDATE tokens SET revoked_ms = ? WHERE revoked_ms IS NULL", milliseconds_of(now));
+    for (const std::string& name : names) audit(database, name, "token revoked");
+    return names;
+  });
+  {
+    const std::lock_guard lock(mutex_);
+    for (const std::string& name : revoked) tokens_.at(name).revoked_at = now;
+  }
+  tell();
+  return static_cast<int>(revoked.size());
+}
+
 std::vector<Token> Tokens::all() const {
   const std::lock_guard lock(mutex_);
   std::vector<Token> found;
@@ -185,6 +203,11 @@ bool Tokens::is_current(const Caller& caller) const {
   if (caller.token.empty()) return !required_ && tokens_.empty();
   const auto found = tokens_.find(caller.token);
   return found != tokens_.end() && holds(found->second);
+}
+
+void Tokens::require_current(const Caller& caller) const {
+  if (!caller.token.empty() && !is_current(caller))
+    throw Refused({"unauthenticated", "The token has expired or was revoked meanwhile."});
 }
 
 void Tokens::on_change(std::function<void()> told) {

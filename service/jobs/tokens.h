@@ -41,12 +41,16 @@ class Tokens {
   /// cannot be.
   tl::expected<std::string, Problem> create(Token token);
   tl::expected<void, Problem> revoke(std::string_view name);  ///< repeatable; not-found
+  int revoke_all();                                           ///< how many held until now
   std::vector<Token> all() const;                             ///< by name
 
   /// Who sends this token ("" for none); unauthenticated.
   tl::expected<Caller, Problem> caller_with(std::string_view token) const;
   /// Whether the token by which the caller is known holds to this moment.
   bool is_current(const Caller& caller) const;
+  /// Throws Refused (unauthenticated) unless the caller's token, when it has one, holds: for the transaction
+  /// in which something is made for it.
+  void require_current(const Caller& caller) const;
 
   /// Calls `told` after every change, from the thread that made it. One at a time; none: an empty function.
   void on_change(std::function<void()> told);

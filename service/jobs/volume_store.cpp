@@ -1,5 +1,7 @@
 #include "service/jobs/volume_store.h"
 
+#include <limits>
+
 #include "service/jobs/stored_files.h"
 #include "service/jobs/stored_json.h"
 
@@ -7,7 +9,7 @@ namespace volsmooth {
 namespace {
 
 constexpr std::string_view kSelectVolume =
-    "SELECT id, options, facts, bytes, sha256, created_ms, tenant, expires_ms FROM volumes ";
+    "SELECT id, options, facts, bytes, sha256, created_ms, tenant, expires_ms, sequence FROM volumes ";
 
 StoredVolume volume_from(const Statement& row) {
   StoredVolume volume;
@@ -46,11 +48,15 @@ std::optional<StoredVolume> VolumeStore::find(std::string_view tenant, std::stri
   });
 }
 
-std::vector<StoredVolume> VolumeStore::of_tenant(std::string_view tenant) {
+std::vector<VolumeStore::Listed> VolumeStore::list(std::string_view tenant, int limit,
+                                                   std::optional<std::int64_t> before) {
   return database_.read([&](Database& database) {
-    return all_of(
-        database.query(std::string(kSelectVolume) + "WHERE tenant = ? ORDER BY sequence DESC", tenant),
-        volume_from);
+    return all_of(database.query(std::string(kSelectVolume) +
+                                     "WHERE tenant = ? AND sequence < ? ORDER BY sequence DESC LIMIT ?",
+                                 tenant, before.value_or(std::numeric_limits<std::int64_t>::max()), limit),
+                  [](const Statement& row) {
+                    return Listed{volume_from(row), row.integer(8)};
+                  });
   });
 }
 
@@ -73,7 +79,7 @@ std::vector<VolumeStore::Owned> VolumeStore::expired() {
 }
 
 VolumeStore::Removal VolumeStore::remove(std::string_view tenant, std::string_view id, Burial reason) {
-  const Removal outcome = database_.write([&](Database& database) {
+  const Removal outcome = database_.write_at_any_rate([&](Database& database) {
     const int removed = database.run(
         "DELETE FROM volumes WHERE id = ?1 AND tenant = ?2 AND NOT EXISTS "
         "(SELECT 1 FROM jobs WHERE volume = ?1 AND state IN ('queued', 'running'))",

@@ -21,17 +21,23 @@ class VolumeStore {
  public:
   explicit VolumeStore(StoreDatabase& database) : database_(database) {}
 
-  /// `also` is done in the same transaction.
+  /// `also` is done in the same transaction, with the volume there; may throw Refused.
   void insert(
       const StoredVolume& volume, const std::function<void(Database&)>& also = [](Database&) {}) {
     database_.write([&](Database& database) {
+      const int inserted = insert_volume(database, volume);
       also(database);
-      return insert_volume(database, volume);
+      return inserted;
     });
   }
   std::optional<StoredVolume> find(std::string_view tenant, std::string_view id);
-  std::vector<StoredVolume> of_tenant(std::string_view tenant);  ///< newest first
-  std::vector<std::string> ids();                                ///< of all tenants
+  /// Of the tenant, newest first, at most so many of those older than `before` (a sequence number).
+  struct Listed {
+    StoredVolume volume;
+    std::int64_t sequence;
+  };
+  std::vector<Listed> list(std::string_view tenant, int limit, std::optional<std::int64_t> before);
+  std::vector<std::string> ids();  ///< of all tenants
 
   enum class Removal { kDone, kInUse, kUnknown };
   /// Unless an unfinished job needs it.

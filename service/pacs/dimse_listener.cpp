@@ -93,7 +93,7 @@ void DimseListener::accept_all(const std::stop_token& stopped) {
     try {
       begin(std::move(connection));
     } catch (const std::exception& error) {
-      settings_.log("dimse-fault", error.what());
+      settings_.log_error("dimse-fault", error.what());
     }
   }
 }
@@ -119,15 +119,17 @@ void DimseListener::begin(FileDescriptor connection) {
 
 void DimseListener::serve(Served& served) {
   Tally tally;
-  std::string end;
+  std::string end = "broken off";
+  bool broken_off = false;
   try {
     end = talk(served, tally);
   } catch (const std::exception&) {  // its volsmooth-dimse is gone, or says what it must not
-    end = "broken off";
+    broken_off = true;
   }
-  settings_.log("dimse-association", "from " + tally.calling + " to " + tally.called + ": " +
-                                         std::to_string(tally.stored) + " stored, " +
-                                         std::to_string(tally.refused) + " refused, " + end);
+  const auto& log = broken_off || tally.refused > 0 ? settings_.log_warning : settings_.log;
+  log("dimse-association", "from " + tally.calling + " to " + tally.called + ": " +
+                               std::to_string(tally.stored) + " stored, " + std::to_string(tally.refused) +
+                               " refused, " + end);
 }
 
 /// How it ended.

@@ -27,7 +27,8 @@ class DimseListener {
     std::string listen;  ///< ADDRESS:PORT
     bool allow_open_network = false;
     std::map<std::string, std::string> presets;  ///< by AE title
-    std::function<void(std::string_view event, const std::string& message)> log;
+    using Log = std::function<void(std::string_view event, const std::string& message)>;
+    Log log, log_warning, log_error;
   };
 
   /// Listens at once. Throws std::runtime_error with a sentence that says what to change.

@@ -36,6 +36,10 @@ bool surely_undone(int code) {
 DatabaseError::DatabaseError(int sqlite_code, const std::string& message)
     : std::runtime_error("database: " + message), code_(sqlite_code) {}
 
+bool DatabaseError::is_full_disk() const {
+  return code_ == SQLITE_FULL;
+}
+
 void Statement::Finalize::operator()(sqlite3_stmt* statement) const {
   sqlite3_finalize(statement);
 }

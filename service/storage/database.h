@@ -24,6 +24,7 @@ class DatabaseError : public std::runtime_error {
  public:
   DatabaseError(int sqlite_code, const std::string& message);
   int code() const { return code_; }  ///< SQLite's primary result code
+  bool is_full_disk() const;
 
  private:
   int code_;

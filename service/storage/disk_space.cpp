@@ -8,8 +8,9 @@ std::int64_t DiskSpace::available_bytes() const {
 }
 
 bool DiskSpace::promise(std::int64_t bytes) {
+  const std::int64_t held_back = held_back_();
   const std::lock_guard lock(mutex_);
-  if (bytes > free_bytes_() - reserved_bytes_ - promised_bytes_) return false;
+  if (bytes > free_bytes_() - reserved_bytes_ - promised_bytes_ - held_back) return false;
   promised_bytes_ += bytes;
   return true;
 }

@@ -22,6 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view kTemporary = "tmp";
+constexpr std::int64_t kBallastBytes = std::int64_t{8} << 20;
 constexpr std::array<std::uint32_t, 4> kNetworkFileSystems = {NFS_SUPER_MAGIC, SMB_SUPER_MAGIC,
                                                               CIFS_SUPER_MAGIC, SMB2_SUPER_MAGIC};
 
@@ -81,7 +82,8 @@ fs::path part_of(fs::path name) {
 
 FileStore::FileStore(fs::path root, std::int64_t reserved_bytes)
     : root_(std::move(root)),
-      disk_(std::make_shared<DiskSpace>([where = root_] { return free_bytes_at(where); }, reserved_bytes)) {
+      disk_(std::make_shared<DiskSpace>([where = root_] { return free_bytes_at(where); }, reserved_bytes)),
+      ballast_(root_ / "ballast", kBallastBytes) {
   if (create_durably(whole(root_))) fs::permissions(root_, fs::perms::owner_all);
   refuse_network_file_system(root_);
   lock_ = lock(root_);
@@ -90,6 +92,10 @@ FileStore::FileStore(fs::path root, std::int64_t reserved_bytes)
 
 std::int64_t FileStore::free_bytes() const {
   return free_bytes_at(root_);
+}
+
+void FileStore::lay_ballast() {
+  if (free_bytes() >= 2 * kBallastBytes) ballast_.lay();
 }
 
 std::optional<IncomingFile> FileStore::receive(std::int64_t expected_bytes) {

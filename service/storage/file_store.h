@@ -7,6 +7,7 @@
 #include <optional>
 #include <string_view>
 
+#include "service/storage/ballast.h"
 #include "service/storage/incoming_file.h"
 #include "service/storage/posix.h"
 
@@ -27,6 +28,13 @@ class FileStore {
 
   /// What can still be received.
   std::int64_t available_bytes() const { return disk_->available_bytes(); }
+
+  /// Nothing is received into what others will need, which `bytes` measures. Set before others use it.
+  void hold_back(std::function<std::int64_t()> bytes) { disk_->hold_back(std::move(bytes)); }
+
+  /// Some MiB for what has to be written on a full disk (storage/ballast.h): laid when the disk has room.
+  void lay_ballast();
+  bool drop_ballast() { return ballast_.drop(); }
 
   /// A new file in the area for unfinished ones; nothing when the disk has no such room beside what others
   /// were promised.
@@ -50,6 +58,7 @@ class FileStore {
   std::filesystem::path root_;
   std::shared_ptr<DiskSpace> disk_;
   FileDescriptor lock_;
+  Ballast ballast_;
 };
 
 }  // namespace volsmooth

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Usage: tests/proof/run.sh [kills|faults|power|model|many|load|slow|tenants [N]]. Sets up a fresh Debian 12,
+# Usage: tests/proof/run.sh [kills|faults|power|model|many|load|slow|tenants|tls [N]]. Sets up a fresh Debian 12,
 # builds, and runs the long form of all proofs of what the daemon promises, or of the one that is named:
 #   kills [N]   kill -9, N (500) times over 10 N small jobs
 #   faults [N]  an error at every N-th (1) call on the data directory
@@ -9,6 +9,7 @@
 #   load [N]    N (100,000) requests by 64 clients beside running jobs
 #   slow [N]    2,000 connections that are as slow as they can be, for N (300) seconds
 #   tenants [N] N (20,000) tries to get at what is another tenant's
+#   tls         testssl looks at the daemon (ten minutes)
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 source client/setup.sh
@@ -28,11 +29,12 @@ prove() {
     load) build/bin/measure_load "${2:-100000}" ;;
     slow) build/bin/measure_slow_clients 2000 "${2:-300}" ;;
     tenants) build/bin/measure_tenants "${2:-20000}" ;;
+    tls) tests/proof/tls.sh build/bin/volsmoothd "${@:2}" ;;
     *) die "there is no proof '$1'" ;;
   esac
 }
 if (($#)); then
   prove "$@"
 else
-  for name in kills faults power model many load slow tenants; do prove "$name"; done
+  for name in kills faults power model many load slow tenants tls; do prove "$name"; done
 fi

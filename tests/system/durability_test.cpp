@@ -79,12 +79,13 @@ std::vector<json> all_jobs(const ServiceClient& service) {
   return all;
 }
 
-/// The sums of all files of the data directory but the database, its log and the lock.
+/// The sums of all files of the data directory but the database, its log, the lock and the ballast.
 std::multiset<std::string> stored_files(const Daemon& daemon) {
   std::multiset<std::string> files;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(daemon.data())) {
     const std::string name = entry.path().filename();
-    const bool bookkeeping = name.starts_with("volsmooth.db") || name.find("lock") != std::string::npos;
+    const bool bookkeeping =
+        name.starts_with("volsmooth.db") || name.find("lock") != std::string::npos || name == "ballast";
     if (entry.is_regular_file() && !bookkeeping) files.insert(sha256_hex(content_of(entry.path())));
   }
   return files;

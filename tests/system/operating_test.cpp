@@ -146,6 +146,43 @@ TEST_F(BackupTest, WhatIsBackedUpBesideTheDaemonIsThereAfterARestore) {
   EXPECT_EQ(there.get("/v1/jobs").at("jobs").size(), 1U);
 }
 
+TEST_F(BackupTest, TokensOfABackupDoNotComeBackUnlessThatIsAskedFor) {
+  const auto token =
+      run({"token", "create", "--name", "reader", "--scope", "read", "--data", daemon_.data()});
+  ASSERT_EQ(token.exit_code, 0) << token.errors;
+  const HeaderFields fields{{"Authorization", "Bearer " + token.output.substr(0, token.output.find('\n'))}};
+  ASSERT_EQ(back_up(folder_ / "backup").exit_code, 0);
+  ASSERT_EQ(run({"token", "revoke", "--name", "reader", "--data", daemon_.data()}).exit_code, 0);
+
+  for (const bool keep : {false, true}) {
+    std::vector<std::string> command{"restore", "--from", folder_ / "backup", "--data",
+                                     folder_ / (keep ? "kept" : "data")};
+    if (keep) command.emplace_back("--keep-tokens");
+    const auto brought = run(command);
+    ASSERT_EQ(brought.exit_code, 0) << brought.errors;
+    EXPECT_EQ(brought.errors.find("1 tokens were revoked") != std::string::npos, !keep) << brought.errors;
+    const Daemon another(VOLSMOOTHD, {}, command[4]);
+    const ServiceClient there(another);
+    EXPECT_EQ(there.call("GET", "/v1/jobs", "", fields).status, keep ? 200 : 401);
+    EXPECT_EQ(there.call("GET", "/v1/jobs").status, 401);
+    EXPECT_EQ(run({"audit", "verify", "--data", command[4]}).exit_code, 0);
+    const std::string audit = run({"audit", "export", "--data", command[4]}).output;
+    const std::string user = R"("token":"uid:)" + std::to_string(::geteuid());
+    for (const std::string action : {"backup begun", "restored from a backup"})
+      EXPECT_THAT(audit, testing::ContainsRegex("\"" + action + "\".*" + user)) << audit;
+    EXPECT_EQ(audit.find("token revoked") != std::string::npos, !keep);
+  }
+}
+
+TEST_F(BackupTest, ABackupWithoutTokensSaysWhomItLetsIn) {
+  ASSERT_EQ(back_up(folder_ / "backup").exit_code, 0);
+  const auto brought = run({"restore", "--from", folder_ / "backup", "--data", folder_ / "data"});
+  EXPECT_EQ(brought.exit_code, 0);
+  EXPECT_THAT(brought.errors, HasSubstr("--require-tokens"));
+  EXPECT_EQ(run({"backup", "--data", folder_ / "nowhere", "--to", folder_ / "x"}).exit_code, 1);
+  EXPECT_FALSE(fs::exists(folder_ / "nowhere"));
+}
+
 TEST_F(BackupTest, NeverOverwritesAndNamesWhatIsDamaged) {
   const ServiceClient service(daemon_);
   const std::string volume = service.upload(ball_file(16)).at("id");

@@ -71,6 +71,34 @@ TEST(Tokens, AreMadeAndRevokedWithoutADaemon) {
   EXPECT_EQ(ServiceClient(daemon).call("GET", "/healthz").status, 200);
 }
 
+/// Each row of the audit that names `object`: who did what.
+std::vector<std::pair<std::string, std::string>> audited(const std::filesystem::path& data,
+                                                         const std::string& object) {
+  std::vector<std::pair<std::string, std::string>> rows;
+  std::istringstream lines(Command::run({"audit", "export"}, data).output);
+  for (std::string line; std::getline(lines, line);)
+    if (const json row = json::parse(line); row.at("object") == object)
+      rows.emplace_back(row.at("token"), row.at("action"));
+  return rows;
+}
+
+TEST(Tokens, AreAuditedAsTheDoingOfTheUserWhoGaveTheCommand) {
+  const std::string user = "uid:" + std::to_string(::geteuid());
+  Daemon daemon(VOLSMOOTHD);
+  make_token(daemon.data(), "beside", "read");
+  daemon.terminate();
+  make_token(daemon.data(), "alone", "read");
+  ASSERT_EQ(Command::run({"token", "revoke", "--name", "beside"}, daemon.data()).exit_code, 0);
+  using testing::ElementsAre;
+  using testing::Pair;
+  EXPECT_THAT(audited(daemon.data(), "beside"),
+              ElementsAre(Pair(user, "token created"), Pair(user, "token revoked")));
+  EXPECT_THAT(audited(daemon.data(), "alone"), ElementsAre(Pair(user, "token created")));
+  EXPECT_THAT(
+      audited(daemon.data(), "audit"),
+      ElementsAre(Pair(user, "audit exported"), Pair(user, "audit exported"), Pair(user, "audit exported")));
+}
+
 TEST(Tokens, AnswerToMistakes) {
   const TemporaryDirectory folder;
   for (const std::vector<std::string>& wrong :

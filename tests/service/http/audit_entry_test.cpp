@@ -67,8 +67,11 @@ TEST_F(AuditedServerTest, BytesThatGoOutAreAudited) {
 TEST_F(AuditedServerTest, WhatWasRefusedIsAuditedWithoutWhatTheClientWrote) {
   EXPECT_EQ(row_of(ask("POST /v1/volumes", "bad voxels")), "POST /v1/volumes, , nifti-bad-header");
   EXPECT_EQ(row_of(submit("v-none")), "POST /v1/jobs, , not-found");
-  EXPECT_EQ(row_of(ask("DELETE /v1/jobs/j-none")), "DELETE /v1/jobs/{id}, j-none, not-found");
+  EXPECT_EQ(row_of(ask("DELETE /v1/jobs/j-aaaaaaaaaaaaaaaa")),
+            "DELETE /v1/jobs/{id}, j-aaaaaaaaaaaaaaaa, not-found");
   EXPECT_EQ(row_of(ask("DELETE /v1/jobs/Jane.Doe")), "DELETE /v1/jobs/{id}, , bad-id");
+  for (const char* name : {"JaneDoe", "j-none", "Mary-Ann_Doe"})
+    EXPECT_EQ(row_of(ask(std::string("DELETE /v1/jobs/") + name)), "DELETE /v1/jobs/{id}, , not-found");
   EXPECT_EQ(row_of(ask("GET /v1/jobs/j-none")), "");
   EXPECT_EQ(row_of(ask("GET /v1/volumes", "", "Origin: http://elsewhere\r\n")), ", , cross-origin");
 }

@@ -147,6 +147,26 @@ TEST_F(Authorization, EveryRouteByEveryKindOfToken) {
   EXPECT_EQ(operations, kScopes.size());
 }
 
+TEST_F(Authorization, WhoMayOnlySubmitIsToldAJobsIdAndStateAlone) {
+  const std::string submit = make("submit", {Scope::kSubmit}), admin = make("admin", {Scope::kAdmin});
+  const Things things = make_things(admin);
+  const std::string order = json{{"volume", things.volume}, {"label", "a name"}}.dump();
+  const std::string fields = "Content-Type: application/json\r\nIdempotency-Key: k\r\n";
+  const HttpAnswer first = ask("POST /v1/jobs", order, bearer(submit) + fields);
+  ASSERT_EQ(first.status, 202);
+  const std::string id = id_of(first);
+  get("/v1/jobs/" + id + "?wait=60", bearer(admin));
+  for (const HttpAnswer& answer : {first, ask("POST /v1/jobs", order, bearer(submit) + fields),
+                                   ask("POST /v1/jobs/" + id + "/cancel", "", bearer(submit)),
+                                   ask("POST /v1/jobs/" + id + "/deliver", "", bearer(submit))}) {
+    EXPECT_EQ(answer.status, 202);
+    json document = json::parse(answer.body);
+    EXPECT_TRUE(document.erase("id") == 1 && document.erase("state") == 1 && document.empty()) << answer.body;
+  }
+  EXPECT_EQ(json::parse(ask("POST /v1/jobs/" + id + "/cancel", "", bearer(admin)).body).at("label"),
+            "a name");
+}
+
 TEST_F(Authorization, IsTheOneFieldOfTheHead) {
   const std::string token = make("read", {Scope::kRead});
   for (const std::string& good : {"Bearer " + token, "bearer   " + token, "BEARER " + token})
@@ -207,7 +227,26 @@ TEST_F(Authorization, AnUploadWhoseTokenIsRevokedOnTheWayIsNotKept) {
   ASSERT_TRUE(jobs_.tokens().revoke("submit"));
   client.send("els");
   EXPECT_EQ(client.receive().status, 401);
-  EXPECT_TRUE(jobs_.volumes(kAnyone).empty());
+  EXPECT_TRUE(jobs_.volumes(kAnyone)->volumes.empty());
+}
+
+/// The peer neither sends nor reads: the deadlines are half a minute away.
+TEST_F(Authorization, ARevocationEndsTransfersAtOnce) {
+  const std::string submit = make("submit", {Scope::kSubmit}), read = make("read", {Scope::kRead});
+  const std::size_t size = 4'000'000;
+  const std::string volume = id_of(ask("POST /v1/volumes", std::string(size, 'v'), bearer(submit)));
+  auto upload = connect(), download = connect();
+  upload.send("POST /v1/volumes HTTP/1.1\r\nHost: localhost\r\n" + bearer(submit) +
+              "Content-Length: 1000\r\n\r\nvox");
+  download.send(request("GET /v1/volumes/" + volume + "/content", "",
+                        bearer(read) + "Range: bytes=0-,1-,2-,3-,4-,5-,6-,7-\r\n"));
+  download.receive_until("\r\n\r\n");
+  std::this_thread::sleep_for(100ms);
+  const auto revoked = std::chrono::steady_clock::now();
+  for (const char* name : {"submit", "read"}) ASSERT_TRUE(jobs_.tokens().revoke(name));
+  EXPECT_EQ(upload.receive().status, 401);
+  EXPECT_LT(download.receive_to_end().size(), size / 2) << "what waits to be sent was sent after all";
+  EXPECT_LT(std::chrono::steady_clock::now() - revoked, 1s);
 }
 
 TEST_F(Authorization, TheFirstTokenClosesTheDoor) {

@@ -31,7 +31,7 @@ TEST_F(Calls, BadFileBecomesNoVolume) {
   const auto answer = ask("POST /v1/volumes", "bad file");
   EXPECT_EQ(answer.status, 422);
   EXPECT_EQ(slug(answer), "nifti-bad-header");
-  EXPECT_TRUE(jobs_.volumes(kAnyone).empty());
+  EXPECT_TRUE(jobs_.volumes(kAnyone)->volumes.empty());
 }
 
 // SHA-256 of "voxels", by coreutils' sha256sum.
@@ -48,7 +48,7 @@ TEST_F(Calls, ABodyIsHeldToItsDigest) {
                      std::string(kJsonType) + "Content-Digest: " + kDigestOfVoxels + "\r\n")),
             "digest-mismatch");
   EXPECT_EQ(slug(ask("POST /v1/volumes", "voxels", "Content-Digest: sha-256=:AAAA:\r\n")), "bad-header");
-  EXPECT_EQ(jobs_.volumes(kAnyone).size(), 2);
+  EXPECT_EQ(jobs_.volumes(kAnyone)->volumes.size(), 2);
   server_->stop();  // the file goes after the answer
   EXPECT_TRUE(std::filesystem::is_empty(directory_ / "tmp"));
 }
@@ -99,7 +99,7 @@ TEST_F(Calls, ChunkedUploadOverTheLimitIsStopped) {
   });
   EXPECT_EQ(slug(client.receive()), "content-too-large");
   sender.join();
-  EXPECT_TRUE(jobs_.volumes(kAnyone).empty());
+  EXPECT_TRUE(jobs_.volumes(kAnyone)->volumes.empty());
 }
 
 TEST_F(Calls, JobRunsToItsResults) {
@@ -267,7 +267,7 @@ TEST_F(Calls, FailedFormLeavesNoVolumeBehind) {
     EXPECT_GE(answer.status, 400);
     EXPECT_EQ(slug(answer), expected);
   }
-  EXPECT_TRUE(jobs_.volumes(kAnyone).empty());
+  EXPECT_TRUE(jobs_.volumes(kAnyone)->volumes.empty());
 }
 
 TEST_F(Calls, FormWhoseSubmissionBreaksLeavesNoVolumeBehind) {
@@ -280,7 +280,7 @@ TEST_F(Calls, FormWhoseSubmissionBreaksLeavesNoVolumeBehind) {
   server_.reset();
   server_.emplace(ServerSettings{.listen = "127.0.0.1:0"}, Api{jobs, metrics_});
   EXPECT_EQ(ask("POST /v1/jobs", form("voxels", "{}"), kFormType).status, 503);
-  EXPECT_TRUE(jobs.volumes(kAnyone).empty());
+  EXPECT_TRUE(jobs.volumes(kAnyone)->volumes.empty());
   server_.reset();
 }
 

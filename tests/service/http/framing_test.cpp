@@ -153,7 +153,7 @@ TEST_P(BadChunk, IsRefusedAndClosesTheConnection) {
   const auto answer = client.exchange(chunked(GetParam()));
   EXPECT_EQ(slug(answer), "bad-chunk");
   EXPECT_TRUE(client.is_closed());
-  EXPECT_TRUE(jobs_.volumes(kAnyone).empty());
+  EXPECT_TRUE(jobs_.volumes(kAnyone)->volumes.empty());
 }
 
 // malicious-input rows H6 and H7.
@@ -180,7 +180,7 @@ TEST_F(Framing, BodyThatEndsEarlyIsDiscarded) {
   client.send("POST /v1/volumes HTTP/1.1\r\nHost: localhost\r\nContent-Length: 100\r\n\r\nabc");
   client.half_close();
   EXPECT_EQ(slug(client.receive()), "request-timeout");
-  EXPECT_TRUE(jobs_.volumes(kAnyone).empty());
+  EXPECT_TRUE(jobs_.volumes(kAnyone)->volumes.empty());
 }
 
 TEST_F(Framing, StalledHeadAndBodyMeetTheirDeadlines) {

@@ -17,7 +17,7 @@ class IdempotencyTest : public ServerTest {
                          const std::string& query = "") {
     return ask("POST /v1/volumes" + query, bytes, key(value));
   }
-  std::size_t volumes() { return jobs_.volumes(kAnyone).size(); }
+  std::size_t volumes() { return jobs_.volumes(kAnyone)->volumes.size(); }
   std::size_t jobs() { return jobs_.jobs(kAnyone, {})->jobs.size(); }
 
   static std::string form(const std::string& bytes, const std::string& order) {

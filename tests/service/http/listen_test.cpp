@@ -1,4 +1,10 @@
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <ctime>
 #include <fstream>
+#include <memory>
+#include <thread>
 
 #include "tests/service/http/running_server.h"
 
@@ -42,6 +48,30 @@ TEST_F(Listen, LivingDaemonKeepsItsSocket) {
   start({.listen = "unix:" + path.string()});
   const Api api{jobs_, metrics_};
   EXPECT_THROW(Server({.listen = "unix:" + path.string()}, api), std::runtime_error);
+  EXPECT_EQ(ask("GET /healthz").status, 200);
+}
+
+/// What only waits makes way, so that the next caller is served.
+TEST_F(Listen, LastsThroughALackOfDescriptors) {
+  std::vector<std::unique_ptr<HttpClient>> idle;
+  for (int i = 0; i < 10; ++i) {
+    idle.push_back(std::make_unique<HttpClient>(server_->address()));
+    ASSERT_EQ(idle.back()->exchange(request("GET /healthz")).status, 200);
+  }
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &before), 0);
+  const int lowest_free = ::dup(0);
+  ::close(lowest_free);
+  const rlimit one_more{static_cast<rlim_t>(lowest_free) + 1, before.rlim_max};  // the client's end
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &one_more), 0);
+  const std::clock_t start = std::clock();
+  HttpClient next(server_->address());
+  const HttpAnswer answer = next.exchange(request("GET /healthz"));
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  const double busy = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
+  ::setrlimit(RLIMIT_NOFILE, &before);
+  EXPECT_EQ(answer.status, 200);
+  EXPECT_LT(busy, 0.2);
   EXPECT_EQ(ask("GET /healthz").status, 200);
 }
 

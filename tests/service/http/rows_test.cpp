@@ -144,7 +144,7 @@ class Rows : public ServerTest {
       else
         EXPECT_THAT(client.receive().body, testing::HasSubstr("\"methods\""));
     }
-    EXPECT_TRUE(jobs_.volumes(kAnyone).empty());
+    EXPECT_TRUE(jobs_.volumes(kAnyone)->volumes.empty());
   }
 };
 

@@ -1,3 +1,5 @@
+#include <csignal>
+
 #include "service/jobs/tokens.h"
 #include "tests/service/http/running_server.h"
 #include "tests/support/tls_client.h"
@@ -9,7 +11,10 @@ using namespace std::chrono_literals;
 
 class Tls : public ServerTest {
  protected:
-  Tls() { start(settings()); }
+  Tls() {
+    ::signal(SIGPIPE, SIG_IGN);  // a connection that is closed in the handshake
+    start(settings());
+  }
 
   ServerSettings settings() const {
     ServerSettings settings{.listen = "127.0.0.1:0"};
@@ -128,6 +133,30 @@ TEST_F(Tls, AHandshakeThatStallsIsGivenUp) {
     std::this_thread::sleep_for(10ms);
   }
   EXPECT_FALSE(open);
+}
+
+TEST_F(Tls, StrangersGetSoManyHandshakesAndWhoHasATokenAnyNumber) {
+  Token token;
+  token.name = "known";
+  token.scopes = {Scope::kRead};
+  const auto begun = [&](int tries) {
+    int count = 0;
+    for (int i = 0; i < tries; ++i) count += TlsClient(server_->address()).handshake() ? 1 : 0;
+    return count;
+  };
+  EXPECT_EQ(begun(60), 60) << "as long as everyone is let in, nobody is a stranger";
+  const std::string text = jobs_.tokens().create(token).value();
+  TlsClient client(server_->address());
+  ASSERT_TRUE(client.handshake());
+  const auto start = std::chrono::steady_clock::now();
+  const int strangers = begun(100);
+  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
+  EXPECT_GE(strangers, 39);
+  EXPECT_LE(strangers, 40 + 10 * taken.count());
+  EXPECT_EQ(begun(1), 0);
+  const std::string authorized = request("GET /v1/jobs", "", "Authorization: Bearer " + text + "\r\n");
+  ASSERT_TRUE(exchange(client, authorized).first.starts_with("HTTP/1.1 200"));
+  EXPECT_EQ(begun(100), 100);
 }
 
 TEST_F(Tls, EventsGoOverIt) {

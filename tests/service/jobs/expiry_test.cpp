@@ -16,11 +16,16 @@ using std::chrono::days;
 /// A service whose clock a test turns.
 class ExpiryTest : public JobServiceTest {
  protected:
-  void open_with(days keep) {
+  void open_with(days keep, Pacs pacs = {}) {
     auto wanted = settings();
     wanted.keep = keep;
     wanted.clock = [this] { return start_ + ahead_.load(); };
-    service_ = std::make_unique<JobService>(wanted, fake_.engine());
+    auto engine = fake_.engine();
+    engine.instances = [](const auto&) -> tl::expected<std::vector<ArrivedInstance>, Problem> {
+      return std::vector<ArrivedInstance>{{"1.2", "1.2.3", "1.2.3.4", "1.2.3.4.5", 0, 6}};
+    };
+    service_.reset();
+    service_ = std::make_unique<JobService>(wanted, engine, std::move(pacs));
     service_->start();
   }
   /// So long after the start of the test.
@@ -46,6 +51,27 @@ class ExpiryTest : public JobServiceTest {
   const Time start_ = now_in_milliseconds();
   std::atomic<std::chrono::minutes> ahead_ = 0min;
 };
+
+/// Their preset has gone from the configuration, so nobody will ever take them.
+TEST_F(ExpiryTest, WhatDevicesSentAndNobodyTookGoesAfterTheSameTime) {
+  Pacs pacs;
+  pacs.presets = {{"head", JobOrder{}, std::chrono::hours(1)}};
+  open_with(days(7), pacs);
+  auto file = service_->begin_arrival().value();
+  const std::string bytes = "patient";
+  file.write(std::as_bytes(std::span(bytes)));
+  ASSERT_TRUE(service_->receive(kAnyone, "head", std::move(file)));
+  open_with(days(7));
+  at(days(7) - 1min);
+  EXPECT_EQ(holding("patient").size(), 1U);
+  at(days(7));
+  EXPECT_TRUE(holding("patient").empty());
+  EXPECT_TRUE(holding("1.2.3.4.5").empty());
+  Database database(settings().data_dir / "volsmooth.db", Database::Access::kReader);
+  EXPECT_TRUE(
+      database.query("SELECT 1 FROM audit WHERE action = 'instances expired' AND subject = 'head'").step());
+  EXPECT_TRUE(database.query("SELECT 1 FROM usage WHERE bytes = 0").step());
+}
 
 TEST_F(ExpiryTest, AVolumeGoesAtTheTimeThatItsDocumentSays) {
   open_with(days(7));

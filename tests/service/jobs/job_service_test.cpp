@@ -9,6 +9,7 @@
 #include <set>
 #include <thread>
 
+#include "service/jobs/tokens.h"
 #include "service/storage/database.h"
 #include "service/storage/digest.h"
 #include "tests/service/jobs/service_fixture.h"
@@ -39,7 +40,7 @@ TEST_F(JobServiceTest, AnUploadIsKeptWithItsDigest) {
 TEST_F(JobServiceTest, ARefusedUploadLeavesNothingBehind) {
   open();
   EXPECT_EQ(slug_of(upload(*service_, "bad bytes")), "nifti-bad-header");
-  EXPECT_TRUE(service_->volumes(kAnyone).empty());
+  EXPECT_TRUE(service_->volumes(kAnyone)->volumes.empty());
   EXPECT_TRUE(names_in(scratch_.path() / "data/tmp").empty());
   EXPECT_TRUE(names_in(scratch_.path() / "data/volumes").empty());
 }
@@ -315,6 +316,45 @@ TEST_F(JobServiceTest, PagesGoFromTheNewestToTheOldestWithoutGaps) {
   }
 }
 
+/// While its upload was verified, or its order planned.
+TEST_F(JobServiceTest, ATokenThatWasRevokedMeanwhileMakesNothing) {
+  open();
+  Token token;
+  token.name = "scanner";
+  token.scopes = {Scope::kSubmit};
+  const std::string text = service_->tokens().create(token).value();
+  const Caller caller = service_->tokens().caller_with(text).value();
+  const auto volume = upload(*service_, "x").value();
+  auto file = service_->begin_upload(caller, 1).value();
+  ASSERT_TRUE(service_->submit(caller, order_for(volume.id)));
+  ASSERT_TRUE(service_->tokens().revoke("scanner"));
+  EXPECT_EQ(slug_of(service_->keep_volume(caller, std::move(file), {})), "unauthenticated");
+  EXPECT_EQ(slug_of(service_->submit(caller, order_for(volume.id))), "unauthenticated");
+  EXPECT_EQ(service_->volumes(kAnyone)->volumes.size(), 1U);
+  EXPECT_EQ(service_->jobs(kAnyone, {})->jobs.size(), 1U);
+  const auto volumes = std::filesystem::directory_iterator(settings().data_dir / "volumes");
+  EXPECT_EQ(std::distance(begin(volumes), end(volumes)), 1);
+}
+
+TEST_F(JobServiceTest, SoDoPagesOfVolumes) {
+  open();
+  std::vector<std::string> newest_first;
+  for (int i = 0; i < 7; ++i) newest_first.insert(newest_first.begin(), upload(*service_, "x").value().id);
+  VolumeQuery query{.limit = 3};
+  std::vector<std::string> seen;
+  do {
+    const VolumePage page = service_->volumes(kAnyone, query).value();
+    EXPECT_LE(page.volumes.size(), 3U);
+    for (const StoredVolume& volume : page.volumes) seen.push_back(volume.id);
+    query.cursor = page.next_cursor;
+    ASSERT_TRUE(upload(*service_, "x"));
+    ASSERT_TRUE(service_->delete_volume(kAnyone, seen.back()));  // nor does what goes
+  } while (!query.cursor.empty());
+  EXPECT_EQ(seen, newest_first);
+  query.cursor = "7";
+  EXPECT_EQ(slug_of(service_->volumes(kAnyone, query)), "bad-query");
+}
+
 TEST_F(JobServiceTest, ResumingGivesExactlyTheLaterEvents) {
   open_and_start();
   const auto volume = upload(*service_, "x").value();
@@ -434,7 +474,7 @@ TEST_F(JobServiceTest, AStopEndsTheVerificationOfUploads) {
   uploading.join();
   EXPECT_EQ(answer, "not-ready");
   EXPECT_EQ(slug_of(upload(*service_, "too late")), "not-ready");
-  EXPECT_TRUE(service_->volumes(kAnyone).empty());
+  EXPECT_TRUE(service_->volumes(kAnyone)->volumes.empty());
   for (const char* folder : {"tmp", "volumes"})
     EXPECT_TRUE(std::filesystem::is_empty(settings().data_dir / folder)) << folder;
 }

@@ -294,7 +294,8 @@ TEST(StoreDatabase, TakesOverWhatAnEarlierVersionWrote) {
   {
     Database as_it_was(file, Database::Access::kWriter);
     as_it_was.execute(
-        "DROP TRIGGER volume_comes; DROP TRIGGER volume_goes; DROP TRIGGER result_comes; DROP TRIGGER "
+        "DROP TRIGGER arrival_comes; DROP TRIGGER arrival_goes; DROP TABLE secrets; DROP TRIGGER "
+        "volume_comes; DROP TRIGGER volume_goes; DROP TRIGGER result_comes; DROP TRIGGER "
         "results_go; DROP TABLE usage; DROP INDEX queued_jobs; DROP INDEX unfinished_disk; ALTER TABLE jobs "
         "DROP COLUMN due_ms; ALTER "
         "TABLE "

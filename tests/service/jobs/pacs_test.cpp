@@ -82,6 +82,7 @@ class PacsJobs : public JobServiceTest {
     JobServiceSettings given = settings();
     given.longest_node_pause = 20ms;
     given.node_patience = patience_;
+    given.tenant_max_bytes = quota_;
     service_ = std::make_unique<JobService>(given, engine, pacs_ ? *pacs_ : node_.pacs());
     service_->start();
   }
@@ -110,8 +111,18 @@ class PacsJobs : public JobServiceTest {
   FakeNode node_;
   std::optional<Pacs> pacs_;  ///< in place of the node's
   std::chrono::milliseconds patience_ = 1h;
+  std::int64_t quota_ = 0;
   std::string seen_volume_;
 };
+
+/// The actions of the audit that concern an object.
+std::vector<std::string> audited(const std::filesystem::path& data, const std::string& object) {
+  Database database(data / "volsmooth.db", Database::Access::kReader);
+  return all_of(
+      database.query("SELECT action || ': ' || outcome FROM audit WHERE subject = ? ORDER BY sequence",
+                     object),
+      [](const Statement& row) { return row.text(0); });
+}
 
 TEST_F(PacsJobs, ASeriesIsFetchedAndThenComputedOn) {
   open();
@@ -119,12 +130,54 @@ TEST_F(PacsJobs, ASeriesIsFetchedAndThenComputedOn) {
   EXPECT_EQ(queued.order.volume, "");
   const Job done = wait_for(*service_, queued.id);
   EXPECT_EQ(done.state, JobState::kSucceeded);
-  ASSERT_EQ(service_->volumes(kAnyone).size(), 1U);
-  EXPECT_EQ(service_->volumes(kAnyone)[0].options.series, "1.2.3.4");
-  EXPECT_EQ(done.order.volume, service_->volumes(kAnyone)[0].id);
+  ASSERT_EQ(service_->volumes(kAnyone)->volumes.size(), 1U);
+  EXPECT_EQ(service_->volumes(kAnyone)->volumes[0].options.series, "1.2.3.4");
+  EXPECT_EQ(done.order.volume, service_->volumes(kAnyone)->volumes[0].id);
   EXPECT_EQ(seen_volume_, done.order.volume);
   EXPECT_EQ(done.order.source->study, "1.2.3");
   EXPECT_EQ(node_.asked, 1);
+}
+
+TEST_F(PacsJobs, ASeriesThatMayNotBeKeptWaitsUntilThereIsRoom) {
+  quota_ = 10;
+  open();
+  const auto other = upload(*service_, "12345").value();
+  const std::string id = service_->submit(kAnyone, source_order()).value().id;
+  Job waiting;
+  while (!waiting.error) waiting = service_->job(kAnyone, id).value();
+  EXPECT_EQ(waiting.error->slug, "quota");
+  EXPECT_EQ(service_->volumes(kAnyone)->volumes.size(), 1U);
+  ASSERT_TRUE(service_->delete_volume(kAnyone, other.id));
+  EXPECT_EQ(wait_for(*service_, id, JobState::kSucceeded).error, std::nullopt);
+}
+
+TEST_F(PacsJobs, ASeriesWhoseResultsMayNotFitOnTheDiskWaits) {
+  patience_ = 50ms;
+  fake_.disk_bytes = std::int64_t{1} << 60;
+  open();
+  const Job failed = wait_for(*service_, service_->submit(kAnyone, source_order()).value().id);
+  EXPECT_EQ(failed.state, JobState::kFailed);
+  EXPECT_EQ(failed.error->slug, "insufficient-storage");
+  EXPECT_TRUE(service_->volumes(kAnyone)->volumes.empty());
+  const auto volumes = std::filesystem::directory_iterator(settings().data_dir / "volumes");
+  EXPECT_EQ(std::distance(begin(volumes), end(volumes)), 0);
+}
+
+TEST_F(PacsJobs, TheAuditSaysWhereADeliveryWent) {
+  open();
+  const std::string id = service_->submit(kAnyone, delivery_order()).value().id;
+  delivered(id, DeliveryState::kDelivered);
+  const auto well = audited(settings().data_dir, id);
+  EXPECT_EQ(std::vector(well.end() - 2, well.end()),
+            (std::vector<std::string>{"sending to printer: done", "delivered to printer: done"}));
+
+  node_.refuses = "out.zip.1";
+  const std::string refused = service_->submit(kAnyone, delivery_order()).value().id;
+  delivered(refused, DeliveryState::kFailed);
+  const auto ill = audited(settings().data_dir, refused);
+  EXPECT_EQ(
+      std::vector(ill.end() - 2, ill.end()),
+      (std::vector<std::string>{"sending to printer: done", "delivery failed to printer: delivery-refused"}));
 }
 
 TEST_F(PacsJobs, AJobWaitsForASourceThatIsDown) {
@@ -153,7 +206,7 @@ TEST_F(PacsJobs, AWaitingJobSaysWhyAndUntilWhen) {
   }
   ASSERT_TRUE(service_->cancel(kAnyone, id));  // it may just be asking again
   EXPECT_EQ(wait_for(*service_, id).state, JobState::kCancelled);
-  EXPECT_TRUE(service_->volumes(kAnyone).empty());
+  EXPECT_TRUE(service_->volumes(kAnyone)->volumes.empty());
 }
 
 TEST_F(PacsJobs, WaitingSurvivesARestart) {
@@ -356,6 +409,7 @@ class PresetJobs : public JobServiceTest {
     service_.reset();
     JobServiceSettings given = settings();
     given.longest_node_pause = 20ms;
+    given.tenant_max_bytes = quota_;
     service_ = std::make_unique<JobService>(given, engine, pacs);
     service_->start();
   }
@@ -381,7 +435,20 @@ class PresetJobs : public JobServiceTest {
   }
 
   std::function<std::optional<Problem>()> inspect_;  ///< says what is wrong with a whole series
+  std::int64_t quota_ = 0;
 };
+
+TEST_F(PresetJobs, WhatDevicesSendIsHeldToTheQuota) {
+  quota_ = 3;
+  open(1h);
+  for (const char* text : {"1", "2", "3"}) ASSERT_TRUE(send(text));
+  EXPECT_EQ(arrived_files(), 3);
+  auto file = service_->begin_arrival().value();
+  const std::string more = "4";
+  file.write(std::as_bytes(std::span(more)));
+  EXPECT_EQ(slug_of(service_->receive(kAnyone, "head", std::move(file))), "quota");
+  EXPECT_EQ(arrived_files(), 3);
+}
 
 TEST_F(PresetJobs, WhatArrivesInPiecesBecomesOneJobASeries) {
   open(300ms);

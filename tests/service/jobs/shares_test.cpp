@@ -9,8 +9,7 @@
 namespace volsmooth {
 namespace {
 
-const Caller kRadiology{"radiology", "scanner", {Scope::kAdmin}},
-    kResearch{"research", "cluster", {Scope::kAdmin}};
+const Caller kRadiology{"radiology", "", {Scope::kAdmin}}, kResearch{"research", "", {Scope::kAdmin}};
 
 class SharesTest : public testing::Test {
  protected:
@@ -97,6 +96,38 @@ TEST_F(QuotaTest, ATenantKeepsNoMoreThanItMayAndOthersDoNotFeelIt) {
 
   EXPECT_TRUE(service_->delete_volume(kRadiology, first->id));
   EXPECT_TRUE(service_->begin_upload(kRadiology, 100));
+}
+
+/// Each was let in when there was room for it; only one of them can have it.
+TEST_F(QuotaTest, HoldsForUploadsThatComeAtTheSameTime) {
+  open_with(100);
+  std::vector<IncomingFile> files;
+  for (int i = 0; i < 2; ++i) {
+    files.push_back(service_->begin_upload(kRadiology, 60).value());
+    const std::string bytes(60, 'x');
+    files.back().write(std::as_bytes(std::span(bytes)));
+  }
+  EXPECT_TRUE(service_->keep_volume(kRadiology, std::move(files[0]), {}));
+  const auto refused = service_->keep_volume(kRadiology, std::move(files[1]), {});
+  EXPECT_EQ(slug_of(refused), "quota");
+  EXPECT_EQ(refused.error().members,
+            nlohmann::json({{"needed_bytes", 60}, {"used_bytes", 60}, {"limit_bytes", 100}}));
+  const auto volumes = std::filesystem::directory_iterator(settings().data_dir / "volumes");
+  EXPECT_EQ(std::distance(begin(volumes), end(volumes)), 1) << "the file of the other one is gone";
+}
+
+TEST_F(QuotaTest, ResultsThatMayComeCount) {
+  open_with(100);
+  const auto volume = upload_as(kRadiology, std::string(30, 'x')).value();
+  fake_.disk_bytes = 60;
+  const Job first = service_->submit(kRadiology, order_for(volume.id, "gate")).value();
+  const auto refused = service_->submit(kRadiology, order_for(volume.id));
+  EXPECT_EQ(slug_of(refused), "quota");
+  EXPECT_EQ(refused.error().members,
+            nlohmann::json({{"needed_bytes", 60}, {"used_bytes", 90}, {"limit_bytes", 100}}));
+  EXPECT_EQ(service_->jobs(kRadiology, {})->jobs.size(), 1U) << "nothing is left of what was refused";
+  fake_.open_gate();
+  finish(kRadiology, first.id);
 }
 
 TEST_F(QuotaTest, ResultsCountAsLongAsTheyAreKept) {

@@ -107,6 +107,22 @@ TEST_F(TokensTest, ARevokedOneIsGoneAtOnceAndForEver) {
   EXPECT_TRUE(after_a_restart.all()[0].revoked_at);
 }
 
+TEST_F(TokensTest, AllCanBeRevokedTogether) {
+  std::vector<std::string> texts;
+  for (const char* name : {"one", "two", "three"}) texts.push_back(tokens_.create(token(name)).value());
+  ASSERT_TRUE(tokens_.revoke("two"));
+  EXPECT_EQ(tokens_.revoke_all(), 2);
+  EXPECT_EQ(tokens_.revoke_all(), 0);
+  for (const std::string& text : texts) EXPECT_EQ(slug_with(text), "unauthenticated");
+  const Tokens after_a_restart(database_);
+  for (const std::string& text : texts) EXPECT_FALSE(after_a_restart.caller_with(text));
+  EXPECT_EQ(database_.read([](Database& database) {
+    return all_of(database.query("SELECT subject FROM audit WHERE action = 'token revoked' ORDER BY subject"),
+                  [](const Statement& row) { return row.text(0); });
+  }),
+            (std::vector<std::string>{"one", "three", "two"}));
+}
+
 TEST_F(TokensTest, HoldsUntilItExpires) {
   Token wanted = token("one");
   wanted.expires_at = now_in_milliseconds() + 200ms;
