@@ -71,6 +71,19 @@ struct Connections {
   }
 };
 
+/// Whether each vertex of `leaving` stands there once, and once in `reaching`, which is as long.
+bool same_once(std::span<const std::uint32_t> leaving, std::span<const std::uint32_t> reaching) {
+  for (const std::uint32_t vertex : leaving) {
+    std::size_t there = 0, here = 0;
+    for (std::size_t n = 0; n < leaving.size(); ++n) {
+      there += reaching[n] == vertex ? 1U : 0U;
+      here += leaving[n] == vertex ? 1U : 0U;
+    }
+    if (there != 1 || here != 1) return false;
+  }
+  return true;
+}
+
 /// Of the vertices [begin, end), each counting its edges to vertices of a higher number. A vertex is closed
 /// when the sides of triangles that leave it and those that reach it are the same edges, each once.
 Connections connect(const Mesh& mesh, const TrianglesAtVertices& triangles, std::size_t begin,
@@ -87,12 +100,17 @@ Connections connect(const Mesh& mesh, const TrianglesAtVertices& triangles, std:
       leaving.push_back(triangle[(place + 1) % 3]);
       reaching.push_back(triangle[(place + 2) % 3]);
     }
+    sum.vertices += leaving.empty() ? 0 : 1;
+    if (constexpr std::size_t kFew = 16; leaving.size() <= kFew && same_once(leaving, reaching)) {
+      // As almost everywhere: quicker than sorting.
+      sum.edges += std::ranges::count_if(leaving, [v](std::uint32_t other) { return other > v; });
+      continue;
+    }
     std::ranges::sort(leaving);
     std::ranges::sort(reaching);
     std::ranges::set_union(leaving, reaching, std::back_inserter(both));
     const bool twice = std::ranges::adjacent_find(leaving) != leaving.end();
     both.erase(std::ranges::unique(both).begin(), both.end());
-    sum.vertices += leaving.empty() ? 0 : 1;
     sum.open_vertices += leaving == reaching && !twice ? 0 : 1;
     sum.edges += both.end() - std::ranges::upper_bound(both, v);
   }
