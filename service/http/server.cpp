@@ -30,7 +30,7 @@ using boost::system::error_code;
 
 constexpr std::string_view kUnixPrefix = "unix:";
 constexpr int kReadingThreads = 4;
-constexpr int kWritingThreads = 2;  // one at a time gets at the store; the other prepares what comes next
+constexpr int kWritingThreads = 16;  // what they store together waits for the disk once
 constexpr int kBulkThreads = 4;
 constexpr int kAuditingThreads = 32;
 constexpr int kVerifyingThreads = 2;

@@ -312,7 +312,10 @@ void JobService::on_store_lost(std::function<void()> observer) {
 }
 
 void JobService::audit_done(AuditEntry entry) {
-  state_->audit_queue.record(std::move(entry));
+  state_->database.write([&](Database& database) {
+    audit(database, entry);
+    return true;
+  });
 }
 
 void JobService::forget_expired() {

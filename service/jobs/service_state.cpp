@@ -45,7 +45,6 @@ JobService::State::State(JobServiceSettings given, Engine computing, Pacs networ
       pacs(std::move(network)),
       files(settings.data_dir, settings.reserved_disk_bytes),
       database(files.path_of("volsmooth.db"), kCheckedFirst, settings.clock),
-      audit_queue(database),
       stored_files(database, files),
       tokens(database),
       cursors(database),

@@ -7,7 +7,6 @@
 #include <string>
 
 #include "service/jobs/arrival_store.h"
-#include "service/jobs/audit_queue.h"
 #include "service/jobs/claimed_job.h"
 #include "service/jobs/cursors.h"
 #include "service/jobs/delivery_runner.h"
@@ -100,7 +99,6 @@ struct JobService::State {
   const Pacs pacs;
   FileStore files;
   StoreDatabase database;
-  AuditQueue audit_queue;
   StoredFiles stored_files;
   Tokens tokens;
   Cursors cursors;

@@ -279,6 +279,8 @@ void check_integrity(Database& database) {
   if (!is_sound(database)) throw std::runtime_error(kDamaged);
 }
 
+constexpr auto kPatienceWithReaders = std::chrono::milliseconds(5);
+
 /// Is there from when damage was found until a check finds none.
 std::filesystem::path mark_of_damage(std::filesystem::path database_file) {
   return database_file += ".damaged";
@@ -317,6 +319,15 @@ std::int64_t prepare(Database& database, const AuditHead& sealed) {
   return number;
 }
 
+/// Where the failure of a step has undone the whole transaction, such as on a full disk, it is everybody's.
+void undo(Savepoint& savepoint, const std::exception_ptr& failure) {
+  try {
+    savepoint.undo();
+  } catch (const DatabaseError&) {
+    std::rethrow_exception(failure);
+  }
+}
+
 }  // namespace
 
 StoreDatabase::StoreDatabase(const std::filesystem::path& file, CheckFirst check, std::function<Time()> clock)
@@ -325,7 +336,16 @@ StoreDatabase::StoreDatabase(const std::filesystem::path& file, CheckFirst check
       integrity_(begin_check(file, check)),
       seal_(file),
       start_number_(prepare(writer_, seal_.last())),
-      reader_(file, Database::Access::kReader) {}
+      readers_{Reader(file), Reader(file), Reader(file), Reader(file)},
+      commits_([this](std::span<CommitQueue::Step* const> steps) { commit_all(steps); }) {}
+
+StoreDatabase::Reader& StoreDatabase::any_reader() {
+  for (Reader& reader : readers_)
+    if (reader.mutex.try_lock()) return reader;
+  Reader& reader = readers_[next_reader_++ % readers_.size()];
+  reader.mutex.lock();
+  return reader;
+}
 
 /// None: it is over.
 std::unique_ptr<IntegrityCheck> StoreDatabase::begin_check(const std::filesystem::path& file,
@@ -346,9 +366,13 @@ std::unique_ptr<IntegrityCheck> StoreDatabase::begin_check(const std::filesystem
 
 void StoreDatabase::damage_found() {
   spdlog::critical(kDamaged);
-  const std::lock_guard lock(writer_mutex_);
   damaged_ = true;
   writer_.condemn();
+  condemn();
+}
+
+void StoreDatabase::condemn() {
+  const std::lock_guard lock(observing_);
   on_condemned_();
 }
 
@@ -360,9 +384,27 @@ std::optional<std::string> StoreDatabase::trouble() const {
 }
 
 void StoreDatabase::on_condemned(std::function<void()> observer) {
-  const std::lock_guard lock(writer_mutex_);
+  const std::lock_guard lock(observing_);
   on_condemned_ = std::move(observer);
   if (condemned()) on_condemned_();
+}
+
+void StoreDatabase::commit_all(std::span<CommitQueue::Step* const> steps) {
+  Transaction transaction(writer_, Transaction::Kind::kWrite);
+  std::size_t failed = 0;
+  for (CommitQueue::Step* step : steps) {
+    Savepoint savepoint(writer_);
+    try {
+      const ActingFor actor(step->actor);
+      step->work();
+      savepoint.keep();
+    } catch (...) {
+      step->failure = std::current_exception();
+      undo(savepoint, step->failure);
+      ++failed;
+    }
+  }
+  if (failed < steps.size()) commit(transaction);
 }
 
 void StoreDatabase::commit(Transaction& transaction) {
@@ -370,7 +412,7 @@ void StoreDatabase::commit(Transaction& transaction) {
   try {
     transaction.commit();
   } catch (const DatabaseError&) {
-    if (condemned()) on_condemned_();
+    if (condemned()) condemn();
     throw;
   }
   if (head != seal_.last()) seal_.write(head);
@@ -388,17 +430,22 @@ void StoreDatabase::forget_tombstones(Time before) {
 }
 
 void StoreDatabase::clear_log() {
-  const std::lock_guard writing(writer_mutex_);
   if (!log_holds_deleted_ || condemned()) return;
-  // Most of it while others read; what is left then is a moment's work, with nobody reading.
-  writer_.execute("PRAGMA wal_checkpoint(PASSIVE)");
-  const std::lock_guard reading(reader_mutex_);
-  // Whoever else reads the file, such as a backup, is not waited for: everybody here would wait along.
-  writer_.execute("PRAGMA busy_timeout = 0");
-  Statement outcome = writer_.query("PRAGMA wal_checkpoint(TRUNCATE)");
-  outcome.step();
-  log_holds_deleted_ = outcome.integer(0) != 0;
-  writer_.execute("PRAGMA busy_timeout = 5000");
+  commits_.run_between([this] {
+    // Most of it while others read; what is left then is a moment's work, with nobody reading.
+    writer_.execute("PRAGMA wal_checkpoint(PASSIVE)");
+    std::vector<std::unique_lock<std::timed_mutex>> reading;
+    for (Reader& reader : readers_) {
+      reading.emplace_back(reader.mutex, kPatienceWithReaders);
+      if (!reading.back()) return;  // another time: all that is to be stored would wait along
+    }
+    // Whoever else reads the file, such as a backup, is not waited for either.
+    writer_.execute("PRAGMA busy_timeout = 0");
+    Statement outcome = writer_.query("PRAGMA wal_checkpoint(TRUNCATE)");
+    outcome.step();
+    log_holds_deleted_ = outcome.integer(0) != 0;
+    writer_.execute("PRAGMA busy_timeout = 5000");
+  });
 }
 
 void bury(Database& database, std::string_view id, std::string_view tenant, Burial reason, Time now) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
@@ -7,11 +8,13 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <utility>
 
 #include "service/jobs/audit_log.h"
 #include "service/jobs/audit_seal.h"
+#include "service/jobs/commit_queue.h"
 #include "service/jobs/job.h"
 #include "service/storage/database.h"
 #include "service/storage/integrity_check.h"
@@ -24,8 +27,8 @@ std::optional<std::int64_t> milliseconds_of(const std::optional<Time>& time);
 Time time_of(std::int64_t milliseconds);
 Time now_in_milliseconds();
 
-/// The database of volumes and jobs: one connection that writes, one that reads, so that a reader never waits
-/// for a writer's fsync. Thread-safe.
+/// The database of volumes and jobs: one connection that writes, by a thread of its own, and some that read,
+/// so that a reader waits neither for a writer's fsync nor for a reader of low priority. Thread-safe.
 class StoreDatabase {
  public:
   /// For how long the check of the whole database comes before anything else; what is left of it then
@@ -44,19 +47,18 @@ class StoreDatabase {
   /// Runs `body(Database&)` on one state of the data.
   template <class Body>
   auto read(const Body& body) {
-    const std::lock_guard lock(reader_mutex_);
-    const Transaction snapshot(reader_, Transaction::Kind::kRead);
-    return body(reader_);
+    Reader& reader = any_reader();
+    const std::lock_guard lock(reader.mutex, std::adopt_lock);
+    const Transaction snapshot(reader.database, Transaction::Kind::kRead);
+    return body(reader.database);
   }
 
-  /// Runs `body(Database&)`; when this returns, what it did is durable, all of it.
+  /// Runs `body(Database&)` on the thread of the store; when this returns, what it did is durable, all of it.
   template <class Body>
   auto write(const Body& body) {
-    const std::lock_guard lock(writer_mutex_);
-    Transaction transaction(writer_, Transaction::Kind::kWrite);
-    auto result = body(writer_);
-    commit(transaction);
-    return result;
+    std::optional<std::invoke_result_t<const Body&, Database&>> result;
+    commits_.run([&] { result.emplace(body(writer_)); });
+    return *std::move(result);
   }
 
   /// The same for what ends something or makes room: on a full disk, with what `on_full_disk` frees.
@@ -84,25 +86,36 @@ class StoreDatabase {
   /// from then on.
   bool condemned() const { return writer_.condemned(); }
   std::optional<std::string> trouble() const;  ///< why, and what is to be done
-  /// Called when that comes about, or at once when it has; holding up all writes.
+  /// Called when that comes about, or at once when it has.
   void on_condemned(std::function<void()> observer);
 
  private:
   std::unique_ptr<IntegrityCheck> begin_check(const std::filesystem::path& file, CheckFirst check);
   void damage_found();
+  void commit_all(std::span<CommitQueue::Step* const> steps);
   void commit(Transaction& transaction);
+  void condemn();
+
+  struct Reader {
+    explicit Reader(const std::filesystem::path& file) : database(file, Database::Access::kReader) {}
+    std::timed_mutex mutex;
+    Database database;
+  };
+  Reader& any_reader();  ///< one that is free, if there is; locked
 
   const std::function<Time()> clock_;
-  std::mutex writer_mutex_, reader_mutex_;      // where both are needed, in this order
   std::atomic<bool> log_holds_deleted_ = true;  // what the last daemon did is not known
   std::atomic<bool> damaged_ = false;
+  std::mutex observing_;
   std::function<void()> on_condemned_ = [] {};
   Database writer_;  // before the readers, which must be closed first
   std::unique_ptr<IntegrityCheck> integrity_;
-  AuditSeal seal_;  // written under the writer's mutex
+  AuditSeal seal_;  // written by the writer's thread
   std::int64_t start_number_;
-  Database reader_;
   std::function<bool()> on_full_disk_ = [] { return false; };
+  std::array<Reader, 4> readers_;
+  std::atomic<unsigned> next_reader_ = 0;
+  CommitQueue commits_;  // its thread uses all of the above
 };
 
 // The pieces that volumes and jobs share. Those that write belong into the caller's transaction.

@@ -10,12 +10,13 @@ constexpr const char* kSettings = R"(
   PRAGMA foreign_keys = ON;
   PRAGMA trusted_schema = OFF;
   PRAGMA mmap_size = 0;
+  PRAGMA temp_store = MEMORY;
 )";
 constexpr const char* kWriterSettings = R"(
   PRAGMA journal_mode = WAL;
   PRAGMA synchronous = FULL;
   PRAGMA secure_delete = ON;
-  PRAGMA wal_autocheckpoint = 1000;
+  PRAGMA wal_autocheckpoint = 4000;
 )";
 constexpr const char* kReaderSettings = R"(
   PRAGMA query_only = ON;
@@ -148,6 +149,18 @@ void Transaction::commit() {
     database_.condemned_ = !surely_undone(error.code());
     throw;
   }
+}
+
+Savepoint::Savepoint(Database& database) : database_(database) {
+  database_.execute("SAVEPOINT part");
+}
+
+void Savepoint::keep() {
+  database_.execute("RELEASE part");
+}
+
+void Savepoint::undo() {
+  database_.execute("ROLLBACK TO part; RELEASE part");
 }
 
 }  // namespace volsmooth

@@ -115,6 +115,19 @@ class Database {
   std::atomic<bool> condemned_ = false;  // also read by other threads
 };
 
+/// A part of a transaction that is undone alone, unless it was kept.
+class Savepoint {
+ public:
+  explicit Savepoint(Database& database);
+  Savepoint(const Savepoint&) = delete;
+  Savepoint& operator=(const Savepoint&) = delete;
+
+  void keep();
+  void undo();  ///< throws when an error has undone the whole transaction
+ private:
+  Database& database_;
+};
+
 /// All or nothing: what is not committed when it goes is undone. Of a reader: one state of the data.
 class Transaction {
  public:

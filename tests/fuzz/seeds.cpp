@@ -89,6 +89,27 @@ void write_http(const fs::path& folder) {
   write(folder / "bare", "GET /healthz HTTP/1.1\nHost: localhost\n\n");
 }
 
+void write_orders(const fs::path& folder) {
+  write(folder / "shortest", R"({"volume": "v-1"})");
+  write(
+      folder / "all",
+      R"({"volume": "v-aaaaaaaaaaaaaaaa", "method": "mean-curvature-flow", "parameters": {"flow_time_mm2": 1.5,
+  "edge": "soft"}, "isovalues": [300, -1e3, 0.1], "mesh_formats": ["stl", "glb"], "mesh_frame": "LPS", "voxel_type":
+  "float32", "outputs": ["nifti", "dicom-series"], "destination": "pacs", "priority": -60, "keep_days": 30, "label":
+  "gr\u00fc\ud83d\ude00"})");
+  write(folder / "source",
+        R"({"source": {"dicomweb": "pacs", "study": "1.2.3", "series": "1.2.3.4"}, "isovalues": "auto"})");
+  write(folder / "radius", R"({"volume": "v-1", "parameters": {"feature_radius_mm": 2}, "isovalues": []})");
+  write(folder / "both", R"({"volume": "v-1", "parameters": {"feature_radius_mm": 2, "flow_time_mm2": 1}})");
+  write(folder / "twice", R"({"volume": "v-1", "volume": "v-2"})");
+  write(folder / "unknown", R"({"volume": "v-1", "<script>": [1e400, NaN]})");
+  write(folder / "deep", R"({"volume": )" + std::string(20, '[') + std::string(20, ']') + "}");
+  write(folder / "surrogate", R"({"volume": "v-1", "label": "\ud800"})");
+  write(folder / "not_utf8", "{\"volume\": \"v-1\", \"label\": \"\xc0\xaf\"}");
+  write(folder / "huge_numbers",
+        R"({"volume": "v-1", "keep_days": 18446744073709551615, "priority": 1e308})");
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -96,4 +117,5 @@ int main(int argc, char** argv) {
   write_dicom(fs::path(argv[1]) / "dicom");
   write_nifti(argv[1]);
   write_http(fs::path(argv[1]) / "http_head");
+  write_orders(fs::path(argv[1]) / "job_order");
 }

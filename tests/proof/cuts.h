@@ -39,7 +39,9 @@ class Cutter {
   std::size_t run(int cuts, int jobs) {
     Workload workload(cuttable_.daemon);
     workload.run(jobs, [&] {
-      if (std::ssize(ready_ms_) == cuts) return std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      // Spread over all jobs, or those that are cut ten times would be given up.
+      if (std::ssize(ready_ms_) == cuts || workload.done() < std::ssize(ready_ms_) * jobs / cuts)
+        return std::this_thread::sleep_for(std::chrono::milliseconds(20));
       try {
         cut();
         start_again();

@@ -29,12 +29,13 @@ class Workload {
     std::vector<std::jthread> clients;
     for (int client = 0; client < kClients; ++client)
       clients.emplace_back([&] {
-        for (int number; (number = next++) < jobs;) order(number);
+        for (int number; (number = next++) < jobs; ++done_) order(number);
         --busy;
       });
     while (busy > 0) disturb();
   }
 
+  int done() const { return done_; }
   /// Where the daemon listens since its last start.
   void moved(const Daemon& daemon) { port_ = daemon.port(); }
   /// The daemon is down for good: the clients give up.
@@ -188,6 +189,7 @@ class Workload {
   }
 
   std::atomic<int> port_;
+  std::atomic<int> done_ = 0;
   std::atomic<bool> given_up_ = false;
   std::array<std::map<std::string, std::string>, kVariants> expected_;
   std::size_t reference_volumes_ = 0;

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cerrno>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -60,6 +61,7 @@ class HttpConnection {
   bool send(std::string_view bytes) {
     while (!bytes.empty()) {
       const ssize_t sent = ::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+      if (sent < 0 && errno == EINTR) continue;
       if (sent <= 0) return false;
       bytes.remove_prefix(static_cast<std::size_t>(sent));
     }
@@ -142,7 +144,9 @@ class HttpConnection {
  private:
   bool fill() {
     char block[65536];
-    const ssize_t got = recv(socket_, block, sizeof block, 0);
+    ssize_t got;
+    do got = recv(socket_, block, sizeof block, 0);
+    while (got < 0 && errno == EINTR);  // such as when this program was stopped and goes on
     if (got > 0) buffer_.append(block, static_cast<std::size_t>(got));
     ended_ = got == 0 || (got < 0 && errno == ECONNRESET);
     return got > 0;

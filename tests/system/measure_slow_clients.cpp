@@ -1,8 +1,8 @@
 // measure_slow_clients [CONNECTIONS [SECONDS]]: how long good clients wait while so many connections (2,000)
 // are as slow as they can be for so long (300 s): a third sends a byte of its head every few seconds, a third
 // a byte of a body, a third reads nothing of a large answer. Whoever is cut off comes again. Prints the good
-// clients' median and 99th percentile in milliseconds, for kept and for new connections, and what was
-// refused.
+// clients' median and 99th percentile in milliseconds, for kept and for new connections, when the longest
+// were, how long the machine held up this program meanwhile, and what was refused.
 #include <poll.h>
 #include <sys/resource.h>
 
@@ -51,15 +51,22 @@ class SlowClient {
   std::unique_ptr<HttpConnection> connection_;
 };
 
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
 struct Times {
   std::vector<double> milliseconds;
+  double longest = 0, longest_at = 0;  ///< the latter in seconds from the beginning
   int failures = 0;
 
-  void add(const auto& exchange) {
+  void add(Clock::time_point beginning, const auto& exchange) {
     const auto start = Clock::now();
     try {
       expect_status(exchange(), 200);
-      milliseconds.push_back(std::chrono::duration<double, std::milli>(Clock::now() - start).count());
+      const double spent = 1000 * seconds_since(start);
+      if (spent > longest) longest = spent, longest_at = seconds_since(beginning);
+      milliseconds.push_back(spent);
     } catch (const std::runtime_error&) {
       ++failures;
     }
@@ -68,8 +75,9 @@ struct Times {
     std::sort(milliseconds.begin(), milliseconds.end());
     const std::size_t count = milliseconds.size();
     if (count == 0) return;
-    std::printf("%s: %zu requests, p50 %.2f ms, p99 %.2f ms, longest %.1f ms, %d failed\n", what, count,
-                milliseconds[count / 2], milliseconds[count * 99 / 100], milliseconds.back(), failures);
+    std::printf("%s: %zu requests, p50 %.2f ms, p99 %.2f ms, longest %.1f ms (after %.1f s), %d failed\n",
+                what, count, milliseconds[count / 2], milliseconds[count * 99 / 100], milliseconds.back(),
+                longest_at, failures);
   }
 };
 
@@ -99,14 +107,19 @@ int main(int argc, char** argv) {
 
   Times kept, fresh;
   HttpConnection connection(daemon.port());
-  for (const auto end = Clock::now() + seconds; Clock::now() < end;) {
-    kept.add([&] { return connection.exchange("GET", "/v1/jobs"); });
-    fresh.add([&] { return service.call("GET", "/v1/volumes"); });
+  double held_up = 0;
+  const auto beginning = Clock::now();
+  while (Clock::now() < beginning + seconds) {
+    kept.add(beginning, [&] { return connection.exchange("GET", "/v1/jobs"); });
+    fresh.add(beginning, [&] { return service.call("GET", "/v1/volumes"); });
+    const auto pause = Clock::now();
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    held_up = std::max(held_up, 1000 * seconds_since(pause) - 5);
   }
   std::printf("%zu slow connections, begun %zu times in %ld s\n", connections, begun.load(),
               long(seconds.count()));
   kept.print("a kept connection");
   fresh.print("new connections");
+  std::printf("a pause of 5 ms lasted up to %.1f ms longer\n", held_up);
   return kept.failures + fresh.failures > 0 ? 1 : 0;
 }

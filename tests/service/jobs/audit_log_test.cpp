@@ -4,7 +4,6 @@
 
 #include <thread>
 
-#include "service/jobs/audit_queue.h"
 #include "service/jobs/audit_seal.h"
 #include "tests/service/jobs/service_fixture.h"
 
@@ -158,12 +157,11 @@ TEST_F(AuditTest, AHeadNotedDownElsewhereShowsWhatWasRewrittenAltogether) {
 }
 
 TEST_F(AuditTest, RowsOfManyThreadsShareCommitsAndAreAllThere) {
-  AuditQueue queue(*database_);
   std::vector<std::thread> threads;
   for (int thread = 0; thread < 8; ++thread)
     threads.emplace_back([&, thread] {
       const ActingFor someone({"t", "token" + std::to_string(thread), ""});
-      for (int row = 0; row < 25; ++row) queue.record({"volume downloaded", "v-" + std::to_string(row)});
+      for (int row = 0; row < 25; ++row) add("v-" + std::to_string(row));
     });
   for (std::thread& thread : threads) thread.join();
   EXPECT_EQ(rows().size(), 200U);

@@ -71,5 +71,36 @@ TEST_F(DamagedDatabaseTest, StopsWritingWhenThatIsSeenOnlyLater) {
   EXPECT_FALSE(fs::exists(scratch_.path() / "volsmooth.db.damaged"));
 }
 
+TEST(StoreDatabaseTest, StepsThatFailLeaveNothingAndTheOthersAllTheirs) {
+  const ScratchFolder scratch;
+  StoreDatabase store(scratch.path() / "volsmooth.db");
+  std::atomic<int> failed = 0;
+  {
+    std::vector<std::jthread> threads;
+    for (int thread = 0; thread < 8; ++thread)
+      threads.emplace_back([&, thread] {
+        for (int step = 0; step < 30; ++step) try {
+            store.write([&](Database& database) {
+              bury(database, std::to_string(100 * thread + step), "t", Burial::kDeleted, store.now());
+              if (step % 3 == 0) throw std::logic_error("no");
+              return true;
+            });
+          } catch (const std::logic_error&) {
+            ++failed;
+          }
+      });
+  }
+  EXPECT_EQ(failed, 80);
+  const std::int64_t kept = store.read([](Database& database) {
+    Statement row = database.query("SELECT count(*) FROM tombstones WHERE id % 100 % 3 <> 0");
+    row.step();
+    return row.integer(0);
+  });
+  EXPECT_EQ(kept, 160);
+  EXPECT_FALSE(store.read([](Database& database) {
+    return database.query("SELECT 1 FROM tombstones WHERE id % 100 % 3 = 0").step();
+  }));
+}
+
 }  // namespace
 }  // namespace volsmooth

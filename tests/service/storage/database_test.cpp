@@ -24,7 +24,7 @@ class DatabaseTest : public testing::Test {
 TEST_F(DatabaseTest, WritesDurablyAndLeavesNothingOfWhatWasDeleted) {
   const std::pair<std::string, std::string> expected[] = {
       {"journal_mode", "wal"}, {"synchronous", "2"},    {"foreign_keys", "1"},         {"secure_delete", "1"},
-      {"mmap_size", "0"},      {"trusted_schema", "0"}, {"wal_autocheckpoint", "1000"}};
+      {"mmap_size", "0"},      {"trusted_schema", "0"}, {"wal_autocheckpoint", "4000"}};
   for (const auto& [setting, value] : expected)
     EXPECT_EQ(value_of(writer_, "PRAGMA " + setting), value) << setting;
 }
@@ -51,6 +51,22 @@ TEST_F(DatabaseTest, WhatIsNotCommittedIsUndone) {
     writer_.run("INSERT INTO t VALUES (1)");
   }
   EXPECT_EQ(value_of(writer_, "SELECT count(*) FROM t"), "0");
+}
+
+TEST_F(DatabaseTest, APartOfATransactionCanBeUndoneAlone) {
+  writer_.execute("CREATE TABLE t (a)");
+  Transaction writing(writer_, Transaction::Kind::kWrite);
+  for (int part = 0; part < 3; ++part) {
+    Savepoint savepoint(writer_);
+    writer_.run("INSERT INTO t VALUES (?)", part);
+    if (part == 1) {
+      savepoint.undo();
+    } else {
+      savepoint.keep();
+    }
+  }
+  writing.commit();
+  EXPECT_EQ(value_of(writer_, "SELECT group_concat(a) FROM t"), "0,2");
 }
 
 TEST_F(DatabaseTest, AReaderNeitherWaitsForAWriterNorSeesHalfOfItsWork) {
