@@ -264,7 +264,7 @@ constexpr const char* kArrivalsCount = R"(
 constexpr std::array kVersions = {kFirstSchema, kIndexByState, kNodes,  kLongJobs, kTenants, kStoredFiles,
                                   kKeeping,     kAudit,        kTokens, kShares,   kLists,   kArrivalsCount};
 /// The last version in which the audit was no chain yet.
-constexpr std::size_t kUnlinkedAudit = std::ranges::find(kVersions, kAudit) - kVersions.begin();
+const std::size_t kUnlinkedAudit = std::ranges::find(kVersions, kAudit) - kVersions.begin();
 constexpr std::size_t kNewestVersion = kVersions.size();
 
 std::size_t schema_version(Database& database) {
