@@ -174,9 +174,10 @@ class JobModel : public JobServiceTest {
     service_.reset();
     fs::remove_all(dead);
     if (!model_.queue.empty()) {
-      Model::Entry& running = model_.jobs[model_.queue.front()];
+      const std::string id = model_.queue.front();
+      Model::Entry& running = model_.jobs[id];
       running.state = JobState::kQueued;
-      if (++running.deaths == kMaxDeaths) leave_queue(model_.queue.front(), JobState::kFailed);
+      if (++running.deaths == kMaxDeaths) leave_queue(id, JobState::kFailed);
     }
     open_at(place_);
     expect_agreement();
