@@ -53,6 +53,10 @@ TEST_F(Listen, LivingDaemonKeepsItsSocket) {
 
 /// What only waits makes way, so that the next caller is served.
 TEST_F(Listen, LastsThroughALackOfDescriptors) {
+#ifdef __SANITIZE_ADDRESS__
+  GTEST_SKIP()
+      << "UBSan opens a pipe to look at the type of an exception, and there is no descriptor left for it";
+#endif
   std::vector<std::unique_ptr<HttpClient>> idle;
   for (int i = 0; i < 10; ++i) {
     idle.push_back(std::make_unique<HttpClient>(server_->address()));
