@@ -339,6 +339,10 @@ StoreDatabase::StoreDatabase(const std::filesystem::path& file, CheckFirst check
       readers_{Reader(file), Reader(file), Reader(file), Reader(file)},
       commits_([this](std::span<CommitQueue::Step* const> steps) { commit_all(steps); }) {}
 
+StoreDatabase::Reader::Reader(const std::filesystem::path& file) : database(file, Database::Access::kReader) {
+  schema_version(database);
+}
+
 StoreDatabase::Reader& StoreDatabase::any_reader() {
   for (Reader& reader : readers_)
     if (reader.mutex.try_lock()) return reader;
@@ -416,6 +420,13 @@ void StoreDatabase::commit(Transaction& transaction) {
     throw;
   }
   if (head != seal_.last()) seal_.write(head);
+}
+
+void StoreDatabase::record(const AuditEntry& entry) {
+  write([&](Database& database) {
+    audit(database, entry);
+    return true;
+  });
 }
 
 void StoreDatabase::forget_tombstones(Time before) {

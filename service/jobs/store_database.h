@@ -74,6 +74,9 @@ class StoreDatabase {
   /// Frees some of the disk; false: it cannot. Set before other threads use the database.
   void on_full_disk(std::function<bool()> free) { on_full_disk_ = std::move(free); }
 
+  /// Audits what changes nothing else here; durable when it returns.
+  void record(const AuditEntry& entry);
+
   /// To be called when something was deleted that nobody is to find any more: the next `clear_log` sees to
   /// it.
   void deleted_something() { log_holds_deleted_ = true; }
@@ -97,7 +100,8 @@ class StoreDatabase {
   void condemn();
 
   struct Reader {
-    explicit Reader(const std::filesystem::path& file) : database(file, Database::Access::kReader) {}
+    /// Opens the log as well, which SQLite leaves to the first reading: there may be no descriptor then.
+    explicit Reader(const std::filesystem::path& file);
     std::timed_mutex mutex;
     Database database;
   };

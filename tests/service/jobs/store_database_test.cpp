@@ -3,9 +3,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <barrier>
 #include <fstream>
 #include <thread>
+#include <vector>
 
+#include "tests/support/few_descriptors.h"
 #include "tests/support/scratch_folder.h"
 
 namespace volsmooth {
@@ -100,6 +104,31 @@ TEST(StoreDatabaseTest, StepsThatFailLeaveNothingAndTheOthersAllTheirs) {
   EXPECT_FALSE(store.read([](Database& database) {
     return database.query("SELECT 1 FROM tombstones WHERE id % 100 % 3 = 0").step();
   }));
+}
+
+/// At the same time, so that each has a reader of its own.
+TEST(StoreDatabaseTest, ReadsWithoutADescriptorToSpare) {
+  const ScratchFolder scratch;
+  StoreDatabase database(scratch.path() / "volsmooth.db");
+  constexpr int kReaders = 4;
+  std::barrier all(kReaders);
+  std::atomic<int> done = 0;
+  const FewDescriptors none(0);
+  {
+    std::vector<std::jthread> threads;
+    for (int i = 0; i < kReaders; ++i)
+      threads.emplace_back([&] {
+        try {
+          done += database.read([&](Database& reader) {
+            all.arrive_and_wait();
+            return static_cast<int>(reader.query("SELECT count(*) FROM volumes").step());
+          });
+        } catch (const DatabaseError&) {
+          all.arrive_and_drop();
+        }
+      });
+  }
+  EXPECT_EQ(done, kReaders);
 }
 
 }  // namespace

@@ -1,13 +1,11 @@
 #include "service/pacs/dimse_sending.h"
 
-#include <fcntl.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
-#include <unistd.h>
 
 #include <system_error>
 
 #include "tests/service/pacs/silent_peer.h"
+#include "tests/support/few_descriptors.h"
 
 namespace volsmooth {
 namespace {
@@ -23,23 +21,6 @@ void let_ubsan_meet_system_error() {
     EXPECT_NE(error.code(), std::error_code(EAGAIN, std::generic_category())) << error.code().message();
   }
 }
-
-/// While it lives, `spare` more descriptors can be opened.
-class FewDescriptors {
- public:
-  explicit FewDescriptors(int spare) {
-    ::getrlimit(RLIMIT_NOFILE, &before_);
-    const int lowest = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
-    ::close(lowest);
-    const rlimit few{static_cast<rlim_t>(lowest + spare), before_.rlim_max};
-    ::setrlimit(RLIMIT_NOFILE, &few);
-  }
-  FewDescriptors(const FewDescriptors&) = delete;
-  ~FewDescriptors() { ::setrlimit(RLIMIT_NOFILE, &before_); }
-
- private:
-  rlimit before_{};
-};
 
 TEST(DimseSending, WantOfDescriptorsPasses) {
   let_ubsan_meet_system_error();
