@@ -143,10 +143,7 @@ Copied copy_store(
 void take_over(const fs::path& database_file, bool keep_tokens) {
   const ActingFor user(user_of_this_machine(::geteuid()));
   StoreDatabase database(database_file);
-  database.write([](Database& writer) {
-    audit(writer, "store", "restored from a backup");
-    return true;
-  });
+  database.record({"restored from a backup", "store"});
   Tokens tokens(database);
   if (!tokens.needed())
     std::cerr << "volsmoothd: the backup knows of no token: until one is made, or --require-tokens is given, "

@@ -161,10 +161,7 @@ void audit_command(const std::filesystem::path& data_dir, const std::string& act
   }
   const FileStore files(data_dir);  // holds it for this process
   const ActingFor user(user_of_this_machine(::geteuid()));
-  StoreDatabase(files.path_of("volsmooth.db")).write([&](Database& database) {
-    audit(database, object, action);
-    return true;
-  });
+  StoreDatabase(files.path_of("volsmooth.db")).record({action, object});
 }
 
 std::string answer_command(JobService& jobs, const std::string& text, uid_t user) {

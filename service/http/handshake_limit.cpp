@@ -15,12 +15,12 @@ constexpr std::size_t kNetworkBytes = 8;
 
 }  // namespace
 
-bool HandshakeLimit::Store::is_full(Clock::time_point now) const {
-  return left + per_second * std::chrono::duration<double>(now - at).count() >= most;
+double HandshakeLimit::Store::level(Clock::time_point now) const {
+  return std::min(most, left + per_second * std::chrono::duration<double>(now - at).count());
 }
 
 bool HandshakeLimit::Store::take(Clock::time_point now) {
-  left = is_full(now) ? most : left + per_second * std::chrono::duration<double>(now - at).count();
+  left = level(now);
   at = now;
   if (left < 1) return false;
   left -= 1;

@@ -24,7 +24,8 @@ class HandshakeLimit {
   struct Store {
     double most, per_second, left;
     Clock::time_point at{};
-    bool is_full(Clock::time_point now) const;
+    double level(Clock::time_point now) const;
+    bool is_full(Clock::time_point now) const { return level(now) >= most; }
     bool take(Clock::time_point now);
   };
   Store& store_of(const std::string& address, Clock::time_point now);

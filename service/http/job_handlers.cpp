@@ -136,15 +136,7 @@ Reply get_jobs(Api& api, Request& request) {
       job_state_from(text_in(query, "state")), text_in(query, "method"), text_in(query, "label"),
       static_cast<int>(number_in(query, "limit").value_or(kDefaultPage)), text_in(query, "cursor")};
   return api.jobs.jobs(request.caller, wanted).map([](const JobPage& page) {
-    // Each document by itself: one of them all would be large, and be copied.
-    std::string text = R"({"jobs":[)";
-    for (const auto& job : page.jobs) {
-      if (!text.ends_with('[')) text += ',';
-      text += document_of(job).dump();
-    }
-    const auto next = page.next_cursor.empty() ? nlohmann::json() : nlohmann::json(page.next_cursor);
-    text += R"(],"next_cursor":)" + next.dump() + "}";
-    return Response{200, {{"Cache-Control", "no-store"}}, Document{std::move(text)}};
+    return page_response("jobs", page.jobs, page.next_cursor, document_of);
   });
 }
 

@@ -37,10 +37,8 @@ Reply get_volumes(Api& api, Request& request) {
   VolumeQuery wanted{.cursor = text_in(request.query, "cursor")};
   if (const auto limit = number_in(request.query, "limit")) wanted.limit = static_cast<int>(*limit);
   return api.jobs.volumes(request.caller, wanted).map([](const VolumePage& page) {
-    auto documents = nlohmann::json::array();
-    for (const auto& volume : page.volumes) documents.push_back(to_json(volume));
-    const auto next = page.next_cursor.empty() ? nlohmann::json() : nlohmann::json(page.next_cursor);
-    return json_response({{"volumes", documents}, {"next_cursor", next}});
+    return page_response("volumes", page.volumes, page.next_cursor,
+                         [](const StoredVolume& volume) { return to_json(volume); });
   });
 }
 

@@ -1,5 +1,7 @@
 #include "service/jobs/arrival_store.h"
 
+#include <algorithm>
+#include <iterator>
 #include <set>
 
 #include "service/jobs/ids.h"
@@ -10,6 +12,15 @@ namespace {
 
 std::vector<std::string> texts_of(Statement rows) {
   return all_of(std::move(rows), [](const Statement& row) { return row.text(0); });
+}
+
+/// Forgets those of the files that no instance is in any more, and returns them.
+std::vector<std::string> forget_nobodys(Database& database, std::vector<std::string> files) {
+  std::erase_if(files, [&](const std::string& file) {
+    return database.query("SELECT 1 FROM arrivals WHERE file = ? LIMIT 1", file).step();
+  });
+  for (const std::string& file : files) forget_file(database, file);
+  return files;
 }
 
 }  // namespace
@@ -90,11 +101,7 @@ std::vector<std::string> ArrivalStore::forget_waiting(Time since) {
           texts_of(database.query("SELECT DISTINCT file" + of_series, preset, tenant, study, series));
       database.run("DELETE" + of_series, preset, tenant, study, series);
       audit(database, preset, "instances expired");
-      for (const std::string& file : its) {
-        if (database.query("SELECT 1 FROM arrivals WHERE file = ? LIMIT 1", file).step()) continue;
-        forget_file(database, file);
-        nobodys.push_back(file);
-      }
+      std::ranges::copy(forget_nobodys(database, its), std::back_inserter(nobodys));
     }
     return nobodys;
   });
@@ -116,13 +123,9 @@ void hand_over(Database& database, const ArrivalStore::QuietSeries& series, std:
 
 std::vector<std::string> forget_arrivals(Database& database, std::string_view job_id) {
   const std::string of_job = "job = (SELECT sequence FROM jobs WHERE id = ?1)";
-  auto files = texts_of(database.query("SELECT DISTINCT file FROM arrivals AS mine WHERE " + of_job +
-                                           " AND NOT EXISTS (SELECT 1 FROM arrivals AS other WHERE "
-                                           "other.file = mine.file AND other.job IS NOT mine.job)",
-                                       job_id));
+  const auto its = texts_of(database.query("SELECT DISTINCT file FROM arrivals WHERE " + of_job, job_id));
   database.run("DELETE FROM arrivals WHERE " + of_job, job_id);
-  for (const std::string& file : files) forget_file(database, file);
-  return files;
+  return forget_nobodys(database, its);
 }
 
 std::int64_t bytes_of_arrivals(Database& database, std::string_view job_id) {

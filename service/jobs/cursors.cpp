@@ -47,13 +47,7 @@ std::string Cursors::at(std::string_view tenant, std::int64_t sequence) const {
   Block block{};
   for (std::size_t i = 0; i < sizeof sequence; ++i)
     block[i] = static_cast<unsigned char>(static_cast<std::uint64_t>(sequence) >> (8 * i));
-  constexpr std::string_view kDigits = "0123456789abcdef";
-  std::string text;
-  for (const unsigned char byte : crypt(block, key_of(secret_, tenant), true)) {
-    text += kDigits[byte >> 4];
-    text += kDigits[byte & 15];
-  }
-  return text;
+  return hex_of(crypt(block, key_of(secret_, tenant), true));
 }
 
 std::optional<std::int64_t> Cursors::sequence_at(std::string_view tenant, std::string_view cursor) const {

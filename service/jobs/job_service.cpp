@@ -312,10 +312,7 @@ void JobService::on_store_lost(std::function<void()> observer) {
 }
 
 void JobService::audit_done(AuditEntry entry) {
-  state_->database.write([&](Database& database) {
-    audit(database, entry);
-    return true;
-  });
+  state_->database.record(entry);
 }
 
 void JobService::forget_expired() {

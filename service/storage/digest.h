@@ -11,6 +11,9 @@
 
 namespace volsmooth {
 
+/// Two digits for each byte, in lower case.
+std::string hex_of(std::span<const unsigned char> bytes);
+
 /// SHA-256 of bytes that come in pieces.
 class Sha256 {
  public:
