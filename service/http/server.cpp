@@ -1,5 +1,8 @@
 #include "service/http/server.h"
 
+#include <netinet/tcp.h>
+#include <sys/socket.h>
+
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
@@ -36,9 +39,19 @@ constexpr int kAuditingThreads = 32;
 constexpr int kVerifyingThreads = 2;
 constexpr auto kGrace = std::chrono::seconds(5);
 constexpr auto kPauseAfterAcceptFailure = std::chrono::milliseconds(100);
+constexpr int kAcceptedAtOnce = 64;
+constexpr int kUnsentBytes = 1 << 18;
 
 [[noreturn]] void fail(const std::string& sentence) {
   throw std::runtime_error(sentence);
+}
+
+/// What is written goes out at once, and the kernel takes no more than goes out: crowds that read nothing of
+/// large answers would have it keep gigabytes for them. A Unix socket has neither option.
+void send_at_once(Socket& socket) {
+  error_code ignored;
+  socket.set_option(tcp::no_delay(true), ignored);
+  ::setsockopt(socket.native_handle(), IPPROTO_TCP, TCP_NOTSENT_LOWAT, &kUnsentBytes, sizeof kUnsentBytes);
 }
 
 tcp::endpoint endpoint_of(const std::string& listen) {
@@ -174,11 +187,17 @@ struct Server::State {
 
   template <typename Acceptor>
   asio::awaitable<void> accept_all(std::shared_ptr<Acceptor> acceptor) {
+    acceptor->non_blocking(true);
     while (acceptor->is_open()) {
       auto [error, accepted] = co_await acceptor->async_accept(asio::as_tuple(asio::use_awaitable));
-      if (!error) {
+      // Before others have their turn again, so that whoever comes last does not wait for a turn of theirs
+      // for each one before him.
+      for (int taken = 1; !error; ++taken) {
         begin_guarded(Socket(std::move(accepted)));
-      } else if (acceptor->is_open()) {
+        if (taken == kAcceptedAtOnce) break;
+        accepted = acceptor->accept(error);
+      }
+      if (error && error != asio::error::would_block && acceptor->is_open()) {
         if (error == asio::error::no_descriptors) make_room();
         co_await asio::steady_timer(io, kPauseAfterAcceptFailure).async_wait(asio::use_awaitable);
       }
@@ -202,7 +221,7 @@ struct Server::State {
     const std::string caller = address_of(*peer.data());
     if (context.tls && context.api.jobs.tokens().needed() && !context.handshakes.admit(caller))
       return context.api.metrics.handshake_refused();
-    socket.set_option(tcp::no_delay(true), ignored);  // a Unix socket has no such option
+    send_at_once(socket);
     if (sessions.size() >= static_cast<std::size_t>(settings.max_connections) && !make_room()) {
       if (context.tls) return;  // a handshake would take what there is too little of
       socket.non_blocking(true, ignored);

@@ -125,8 +125,8 @@ Session::Awaitable<bool> Session::send_file(Exchange& exchange, const FileBody& 
     if (!co_await write(exchange, piece.prefix)) co_return false;
     const std::int64_t end = piece.offset + piece.length;
     for (std::int64_t at = piece.offset; at < end; at += static_cast<std::int64_t>(block.size())) {
-      block.resize(static_cast<std::size_t>(std::min(kFileBlockBytes - at % kFileBlockBytes, end - at)));
       const auto read = co_await run_guarded(context_.bulk, exchange, [&]() -> tl::expected<void, Problem> {
+        block.resize(static_cast<std::size_t>(std::min(kFileBlockBytes - at % kFileBlockBytes, end - at)));
         body.file->read(at, std::as_writable_bytes(std::span(block)));
         return {};
       });

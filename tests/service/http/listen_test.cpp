@@ -1,7 +1,9 @@
 #include <ctime>
 #include <fstream>
+#include <iomanip>
 #include <memory>
 #include <optional>
+#include <sstream>
 #include <thread>
 
 #include "tests/service/http/running_server.h"
@@ -67,6 +69,36 @@ TEST_F(Listen, LastsThroughALackOfDescriptors) {
   EXPECT_EQ(answer.status, 200);
   EXPECT_LT(busy, 0.2);
   EXPECT_EQ(ask("GET /healthz").status, 200);
+}
+
+/// Bytes that the kernel keeps for the peers of the connections to `port`.
+std::int64_t bytes_to_send(int port) {
+  std::ostringstream local;
+  local << "0100007F:" << std::hex << std::uppercase << std::setw(4) << std::setfill('0') << port;
+  std::ifstream connections("/proc/net/tcp");
+  std::int64_t bytes = 0;
+  for (std::string line; std::getline(connections, line);) {
+    std::istringstream fields(line);
+    std::string number, address, peer, state, queues;
+    fields >> number >> address >> peer >> state >> queues;
+    if (address == local.str() && state == "01") bytes += std::stoll(queues, nullptr, 16);
+  }
+  return bytes;
+}
+
+TEST_F(Listen, KernelKeepsLittleForAPeerThatReadsNothing) {
+  const std::string volume = upload(std::string(std::size_t{4} << 20, 'v'));
+  const std::string address = server_->address();
+  const int port = std::stoi(address.substr(address.rfind(':') + 1));
+  HttpClient idle(address);
+  idle.send(request("GET /v1/volumes/" + volume + "/content"));
+  std::int64_t most = 0;
+  for (int look = 0; look < 50; ++look) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    most = std::max(most, bytes_to_send(port));
+  }
+  EXPECT_GT(most, 0);
+  EXPECT_LT(most, 1 << 19);
 }
 
 TEST_F(Listen, OwnAddressIsAnAcceptedHost) {
