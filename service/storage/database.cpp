@@ -18,6 +18,7 @@ constexpr const char* kWriterSettings = R"(
   PRAGMA secure_delete = ON;
   PRAGMA wal_autocheckpoint = 4000;
 )";
+constexpr std::size_t kMostIdle = 256;
 constexpr const char* kReaderSettings = R"(
   PRAGMA query_only = ON;
   PRAGMA wal_autocheckpoint = 0;
@@ -41,14 +42,37 @@ bool DatabaseError::is_full_disk() const {
   return code_ == SQLITE_FULL;
 }
 
-void Statement::Finalize::operator()(sqlite3_stmt* statement) const {
+IdleStatements::~IdleStatements() {
+  for (const auto& [sql, statement] : by_sql_) sqlite3_finalize(statement);
+}
+
+sqlite3_stmt* IdleStatements::take(std::string_view sql) {
+  const auto found = by_sql_.find(std::string(sql));
+  if (found == by_sql_.end()) return nullptr;
+  sqlite3_stmt* const statement = found->second;
+  by_sql_.erase(found);
+  return statement;
+}
+
+void IdleStatements::give_back(sqlite3_stmt* statement) {
+  sqlite3_reset(statement);  // what its last step came to was told then
+  sqlite3_clear_bindings(statement);
+  try {
+    if (by_sql_.size() < kMostIdle) {
+      by_sql_.emplace(sqlite3_sql(statement), statement);
+      return;
+    }
+  } catch (const std::bad_alloc&) {
+  }
   sqlite3_finalize(statement);
 }
 
-Statement::Statement(sqlite3* connection, std::string_view sql) {
+Statement::Statement(sqlite3* connection, IdleStatements& idle, std::string_view sql)
+    : statement_(idle.take(sql), {&idle}) {
+  if (statement_) return;
   sqlite3_stmt* statement = nullptr;
-  const int code =
-      sqlite3_prepare_v2(connection, sql.data(), static_cast<int>(sql.size()), &statement, nullptr);
+  const int code = sqlite3_prepare_v3(connection, sql.data(), static_cast<int>(sql.size()),
+                                      SQLITE_PREPARE_PERSISTENT, &statement, nullptr);
   statement_.reset(statement);
   if (code != SQLITE_OK) throw_error(connection, code);
 }
@@ -134,7 +158,7 @@ int Database::changes() const {
 
 Transaction::Transaction(Database& database, Kind kind) : database_(database) {
   if (database.condemned_) throw DatabaseError(SQLITE_IOERR, "nothing is written any more");
-  database.execute(kind == Kind::kWrite ? "BEGIN IMMEDIATE" : "BEGIN");
+  database.run(kind == Kind::kWrite ? "BEGIN IMMEDIATE" : "BEGIN");
 }
 
 Transaction::~Transaction() {
@@ -143,7 +167,7 @@ Transaction::~Transaction() {
 
 void Transaction::commit() {
   try {
-    database_.execute("COMMIT");
+    database_.run("COMMIT");
     open_ = false;
   } catch (const DatabaseError& error) {
     database_.condemned_ = !surely_undone(error.code());
@@ -152,15 +176,16 @@ void Transaction::commit() {
 }
 
 Savepoint::Savepoint(Database& database) : database_(database) {
-  database_.execute("SAVEPOINT part");
+  database_.run("SAVEPOINT part");
 }
 
 void Savepoint::keep() {
-  database_.execute("RELEASE part");
+  database_.run("RELEASE part");
 }
 
 void Savepoint::undo() {
-  database_.execute("ROLLBACK TO part; RELEASE part");
+  database_.run("ROLLBACK TO part");
+  database_.run("RELEASE part");
 }
 
 }  // namespace volsmooth

@@ -11,6 +11,7 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -30,10 +31,26 @@ class DatabaseError : public std::runtime_error {
   int code_;
 };
 
-/// One prepared statement with its values bound; read row by row.
+/// The statements of a connection that are prepared and not in use: preparing one takes longer than many a
+/// query.
+class IdleStatements {
+ public:
+  IdleStatements() = default;
+  IdleStatements(const IdleStatements&) = delete;
+  IdleStatements& operator=(const IdleStatements&) = delete;
+  ~IdleStatements();
+
+  sqlite3_stmt* take(std::string_view sql);  ///< none: null
+  void give_back(sqlite3_stmt* statement);   ///< without its values
+
+ private:
+  std::unordered_multimap<std::string, sqlite3_stmt*> by_sql_;
+};
+
+/// One prepared statement with its values bound; read row by row. Its connection outlives it.
 class Statement {
  public:
-  Statement(sqlite3* connection, std::string_view sql);
+  Statement(sqlite3* connection, IdleStatements& idle, std::string_view sql);
 
   /// Binds the next `?` (from the left, or ?1, ?2, ...).
   Statement& bind(double value);
@@ -57,10 +74,11 @@ class Statement {
   Statement& bind_integer(std::int64_t value);
   void check(int code) const;
 
-  struct Finalize {
-    void operator()(sqlite3_stmt* statement) const;
+  struct GiveBack {
+    IdleStatements* idle;
+    void operator()(sqlite3_stmt* statement) const { idle->give_back(statement); }
   };
-  std::unique_ptr<sqlite3_stmt, Finalize> statement_;
+  std::unique_ptr<sqlite3_stmt, GiveBack> statement_;
   int bound_ = 0;
 };
 
@@ -84,7 +102,7 @@ class Database {
 
   template <class... Values>
   Statement query(std::string_view sql, const Values&... values) {
-    Statement statement(connection_.get(), sql);
+    Statement statement(connection_.get(), idle_, sql);
     (statement.bind(values), ...);
     return statement;
   }
@@ -112,6 +130,7 @@ class Database {
     void operator()(sqlite3* connection) const;
   };
   std::unique_ptr<sqlite3, Close> connection_;
+  IdleStatements idle_;                  // gone before the connection
   std::atomic<bool> condemned_ = false;  // also read by other threads
 };
 

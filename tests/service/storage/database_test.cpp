@@ -44,6 +44,36 @@ TEST_F(DatabaseTest, ValuesComeBackAsTheyWere) {
   EXPECT_FALSE(row.step());
 }
 
+/// A prepared statement is used again, and shows nothing of its earlier use.
+TEST_F(DatabaseTest, TheSameQueryBeginsAnew) {
+  writer_.execute("CREATE TABLE t (a INTEGER); INSERT INTO t VALUES (1), (2), (3)");
+  constexpr std::string_view kFrom = "SELECT a, ?2 FROM t WHERE a >= ?1 ORDER BY a";
+  {
+    Statement left_early = writer_.query(kFrom, 1, "value"), beside_it = writer_.query(kFrom, 2, "other");
+    ASSERT_TRUE(left_early.step() && beside_it.step());
+    EXPECT_EQ(left_early.integer(0), 1);
+    EXPECT_EQ(beside_it.integer(0), 2);
+  }
+  for (int use = 0; use < 2; ++use) {
+    Statement anew = writer_.query(kFrom, 1);
+    ASSERT_TRUE(anew.step());
+    EXPECT_EQ(anew.integer(0), 1);
+    EXPECT_TRUE(anew.is_null(1));
+  }
+  writer_.execute("DROP TABLE t");  // which a statement in the middle of its rows would forbid
+}
+
+TEST_F(DatabaseTest, AQueryThatFailedCanBeAskedAgain) {
+  writer_.execute("CREATE TABLE t (a INTEGER UNIQUE)");
+  for (const int value : {1, 1, 2, 2}) {
+    try {
+      writer_.run("INSERT INTO t VALUES (?)", value);
+    } catch (const DatabaseError&) {
+    }
+  }
+  EXPECT_EQ(value_of(writer_, "SELECT group_concat(a) FROM t"), "1,2");
+}
+
 TEST_F(DatabaseTest, WhatIsNotCommittedIsUndone) {
   writer_.execute("CREATE TABLE t (a)");
   {
