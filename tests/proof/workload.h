@@ -53,8 +53,7 @@ class Workload {
       for (const auto& [number, made] : made_) look_at(service, number, made, ids);
       for (const auto& [label, id] : ids) find("job " + id + ", label " + label + ": nobody knows of it");
       std::set<std::string> volumes;
-      const json listed = service.get("/v1/volumes");
-      for (const json& volume : listed.at("volumes")) volumes.insert(volume.at("id"));
+      for (const json& volume : service.all("volumes")) volumes.insert(volume.at("id"));
       for (const auto& [number, made] : made_)
         if (!made.deleted && volumes.erase(made.volume) == 0) find("volume " + made.volume + " is lost");
       if (volumes.size() != reference_volumes_) find("volumes that nobody knows of");
@@ -147,16 +146,11 @@ class Workload {
 
   std::map<std::string, std::string> jobs_by_label(const ServiceClient& service) {
     std::map<std::string, std::string> ids;
-    std::string cursor;
-    do {
-      const json page = service.get("/v1/jobs?limit=200" + (cursor.empty() ? "" : "&cursor=" + cursor));
-      for (const json& job : page.at("jobs")) {
-        const std::string label = job.at("label");
-        if (label != "reference" && !ids.emplace(label, job.at("id")).second)
-          find("job " + label + " is there twice");
-      }
-      cursor = page.at("next_cursor").is_null() ? "" : page.at("next_cursor").get<std::string>();
-    } while (!cursor.empty());
+    for (const json& job : service.all("jobs")) {
+      const std::string label = job.at("label");
+      if (label != "reference" && !ids.emplace(label, job.at("id")).second)
+        find("job " + label + " is there twice");
+    }
     return ids;
   }
 

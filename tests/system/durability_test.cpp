@@ -68,17 +68,6 @@ int successes_in_events(const Daemon& daemon, const std::string& id) {
   return found;
 }
 
-std::vector<json> all_jobs(const ServiceClient& service) {
-  std::vector<json> all;
-  std::string cursor;
-  do {
-    const json page = service.get("/v1/jobs?limit=7" + (cursor.empty() ? "" : "&cursor=" + cursor));
-    for (const json& job : page.at("jobs")) all.push_back(job);
-    cursor = page.at("next_cursor").is_null() ? "" : page.at("next_cursor").get<std::string>();
-  } while (!cursor.empty());
-  return all;
-}
-
 /// The sums of all files of the data directory but the database, its log, the lock and the ballast.
 std::multiset<std::string> stored_files(const Daemon& daemon) {
   std::multiset<std::string> files;
@@ -109,7 +98,7 @@ void expect_all_done_once(const Daemon& daemon, const Acknowledged& acknowledged
   }
 
   std::set<std::string> listed;
-  for (const json& job : all_jobs(service)) {
+  for (const json& job : service.all("jobs", 7)) {
     const std::string id = job.at("id");
     SCOPED_TRACE(id);
     EXPECT_TRUE(listed.insert(id).second) << "listed twice";
@@ -152,7 +141,7 @@ TEST(Durability, KillingTheDaemonLosesAndDoublesNothing) {
   ASSERT_GE(acknowledged.jobs.size(), kJobs);
 
   const ServiceClient service(daemon);
-  for (const json& job : all_jobs(service)) service.wait(job.at("id"));
+  for (const json& job : service.all("jobs", 7)) service.wait(job.at("id"));
   EXPECT_EQ(daemon.terminate(), 0);
   daemon.start();  // sweeps what the last kill may have left
   expect_all_done_once(daemon, acknowledged);

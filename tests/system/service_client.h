@@ -33,6 +33,19 @@ class ServiceClient {
 
   json get(const std::string& target) const { return expect_status(call("GET", target), 200).document(); }
 
+  /// All jobs, or volumes: page by page.
+  std::vector<json> all(const std::string& what, int per_page = 200) const {
+    std::vector<json> all;
+    std::string cursor;
+    do {
+      const json page = get("/v1/" + what + "?limit=" + std::to_string(per_page) + cursor);
+      for (const json& item : page.at(what)) all.push_back(item);
+      const json& next = page.at("next_cursor");
+      cursor = next.is_null() ? "" : "&cursor=" + next.get<std::string>();
+    } while (!cursor.empty());
+    return all;
+  }
+
   json upload(std::string_view file, const std::string& query = {}) const {
     return expect_status(call("POST", "/v1/volumes" + query, file), 201).document();
   }
