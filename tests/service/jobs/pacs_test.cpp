@@ -395,7 +395,11 @@ class PresetJobs : public JobServiceTest {
  protected:
   void open(std::chrono::milliseconds quiet = 1ms) {
     auto engine = fake_.engine();
-    engine.instances = instances_of_digits;
+    engine.instances = [this](const std::filesystem::path& file) {
+      auto instances = instances_of_digits(file);
+      if (const auto meanwhile = std::exchange(while_read_, {})) meanwhile();
+      return instances;
+    };
     if (inspect_)
       engine.inspect = [this, taken = engine.inspect](
                            const auto& file, const auto& options,
@@ -435,6 +439,7 @@ class PresetJobs : public JobServiceTest {
   }
 
   std::function<std::optional<Problem>()> inspect_;  ///< says what is wrong with a whole series
+  std::function<void()> while_read_;                 ///< happens once, while what was sent is read
   std::int64_t quota_ = 0;
 };
 
@@ -448,6 +453,19 @@ TEST_F(PresetJobs, WhatDevicesSendIsHeldToTheQuota) {
   file.write(std::as_bytes(std::span(more)));
   EXPECT_EQ(slug_of(service_->receive(kAnyone, "head", std::move(file))), "quota");
   EXPECT_EQ(arrived_files(), 3);
+}
+
+/// Both were let in when there was room for one of them.
+TEST_F(PresetJobs, WhatDevicesSendAtTheSameTimeIsHeldToTheQuota) {
+  quota_ = 3;
+  open(1h);
+  ASSERT_TRUE(send("11"));
+  while_read_ = [&] { EXPECT_TRUE(send("2")); };
+  const auto refused = send("3");
+  EXPECT_EQ(slug_of(refused), "quota");
+  EXPECT_EQ(refused.error().members,
+            nlohmann::json({{"needed_bytes", 1}, {"used_bytes", 3}, {"limit_bytes", 3}}));
+  EXPECT_EQ(arrived_files(), 2) << "the file of the refused one is gone";
 }
 
 TEST_F(PresetJobs, WhatArrivesInPiecesBecomesOneJobASeries) {
