@@ -56,7 +56,7 @@ void Session::tell_news() {
 }
 
 void Session::tokens_changed() {
-  if (wake_) return tell_news();  // it looks for itself, and ends as it should
+  if (wake_ && !writing_) return tell_news();  // it looks for itself, and ends as it should
   if (!serving_ || serving_->request.caller.token.empty() || check_current(*serving_)) return;
   const bool answer_has_begun = serving_->record.status != 0;
   answer_has_begun ? connection_.break_off() : connection_.stop_reading();

@@ -110,7 +110,8 @@ class Session {
   bool idle_ = false;
   bool made_way_ = false;
   std::optional<std::chrono::steady_clock::time_point> waiting_since_ = std::chrono::steady_clock::now();
-  bool unread_ = false;         ///< whether the peer may still be sending what nobody will read
+  bool unread_ = false;  ///< whether the peer may still be sending what nobody will read
+  bool writing_ = false;
   std::shared_ptr<Wake> wake_;  ///< while it waits for news
 };
 

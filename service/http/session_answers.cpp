@@ -146,9 +146,9 @@ Session::Awaitable<bool> Session::send_events(Exchange& exchange, EventStream& s
   };
 
   bool connected = true;
-  for (bool last = false; connected && !last && !context_.stopping && check_current(exchange);) {
+  for (bool last = false; connected && !last && !context_.stopping;) {
     auto batch = co_await run_guarded(context_.reading, exchange, [&] { return stream.next(); });
-    if (!batch) break;  // the job is gone, and with it what there was to say
+    if (!batch || !check_current(exchange)) break;  // the job is gone, and with it what there was to say
     last = batch->last;
     if (!batch->text.empty()) connected = co_await write(exchange, framed(batch->text));
     if (last || !connected) break;
@@ -196,7 +196,10 @@ Session::Awaitable<Reply> Session::wait_for(Exchange& exchange, LongPoll& poll, 
 
 Session::Awaitable<bool> Session::write(Exchange& exchange, std::string_view bytes) {
   exchange.record.bytes_out += static_cast<std::int64_t>(bytes.size());
-  return connection_.write(bytes, context_.settings.write_seconds);
+  writing_ = true;
+  const bool written = co_await connection_.write(bytes, context_.settings.write_seconds);
+  writing_ = false;
+  co_return written;
 }
 
 }  // namespace volsmooth

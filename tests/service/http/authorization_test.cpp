@@ -249,6 +249,24 @@ TEST_F(Authorization, ARevocationEndsTransfersAtOnce) {
   EXPECT_LT(std::chrono::steady_clock::now() - revoked, 1s);
 }
 
+/// The peer has much to read and does not; what it has not got yet it never gets.
+TEST_F(Authorization, ARevocationBreaksOffEventsOnTheirWay) {
+  const std::string submit = make("submit", {Scope::kSubmit}), read = make("read", {Scope::kRead});
+  const std::string volume = id_of(ask("POST /v1/volumes", "voxels", bearer(submit)));
+  const std::string job =
+      id_of(ask("POST /v1/jobs", json{{"volume", volume}, {"label", "much to tell"}}.dump(),
+                bearer(submit) + "Content-Type: application/json\r\n"));
+  while (engine_.at_gate == 0) std::this_thread::sleep_for(1ms);
+  auto stream = connect();
+  stream.send(request("GET /v1/jobs/" + job + "/events", "", bearer(read)));
+  stream.receive_until("event: progress");
+  std::this_thread::sleep_for(100ms);
+  const auto revoked = std::chrono::steady_clock::now();
+  ASSERT_TRUE(jobs_.tokens().revoke("read"));
+  EXPECT_LT(stream.receive_to_end().size(), 2'600'000) << "of 5.2 MB";
+  EXPECT_LT(std::chrono::steady_clock::now() - revoked, 1s);
+}
+
 TEST_F(Authorization, TheFirstTokenClosesTheDoor) {
   EXPECT_EQ(get("/v1/jobs", "").status, 200);
   const std::string token = make("read", {Scope::kRead});

@@ -71,7 +71,9 @@ struct FakeEngine {
     } leave{computing};
     const std::string& what = task.order.label;
     report("read", 0.1);
-    if (what == "gate") wait_at_gate(report);
+    if (what == "much to tell")  // some MB of events
+      for (char stage = 'A'; stage <= 'Z'; ++stage) report(std::string(200'000, stage), 0.2);
+    if (what == "gate" || what == "much to tell") wait_at_gate(report);
     if (what == "throw") throw std::runtime_error("broken");
     if (what == "full") throw std::system_error(ENOSPC, std::generic_category(), "write");
     if (what == "problem") return tl::unexpected(Problem{"bad-parameter", "No.", {{"member", "x"}}});
