@@ -1,7 +1,6 @@
 #include "service/http/body_receiver.h"
 
 #include <span>
-#include <system_error>
 
 #include "service/http/ascii.h"
 #include "service/http/multipart.h"
@@ -30,12 +29,7 @@ tl::expected<void, Problem> append(std::string& text, std::string_view bytes) {
 
 tl::expected<void, Problem> append(IncomingFile& file, std::string_view bytes, std::int64_t limit) {
   if (file.bytes() + static_cast<std::int64_t>(bytes.size()) > limit) return too_large(limit);
-  try {
-    file.write(std::as_bytes(std::span(bytes)));
-  } catch (const std::system_error& error) {
-    if (error.code() != std::errc::no_space_on_device) throw;
-    return tl::unexpected(Problem{"insufficient-storage", "The disk is full; try again later."});
-  }
+  file.write(std::as_bytes(std::span(bytes)));
   return {};
 }
 

@@ -32,7 +32,8 @@ Problem problem_of(ReadFailure failure) {
 Session::Session(Socket socket, std::string peer, SessionContext& context)
     : connection_(std::move(socket), context.tls.get()), peer_(std::move(peer)), context_(context) {}
 
-Problem Session::fault(const Exchange& exchange, const std::exception& error) {
+Problem Session::fault(const Exchange& exchange, const std::exception& error) const {
+  if (auto full = context_.api.jobs.full_disk(error)) return *std::move(full);
   const auto id = exchange.record.id;
   log_fault(id, exchange.route ? exchange.route->pattern : "", error.what());
   // By contract, the store's failures are the only runtime errors down there.

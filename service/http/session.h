@@ -70,9 +70,8 @@ class Session {
 
   /// Runs `work`, which returns an expected value, on a pool; what it throws becomes a problem.
   template <typename Work>
-  static Awaitable<std::invoke_result_t<Work>> run_guarded(ThreadPool& pool, const Exchange& exchange,
-                                                           Work work) {
-    return pool.run([&exchange, work]() -> std::invoke_result_t<Work> {
+  Awaitable<std::invoke_result_t<Work>> run_guarded(ThreadPool& pool, const Exchange& exchange, Work work) {
+    return pool.run([this, &exchange, work]() -> std::invoke_result_t<Work> {
       try {
         return work();
       } catch (const std::exception& error) {
@@ -80,7 +79,7 @@ class Session {
       }
     });
   }
-  static Problem fault(const Exchange& exchange, const std::exception& error);
+  Problem fault(const Exchange& exchange, const std::exception& error) const;
 
   Awaitable<bool> serve_one();
   Awaitable<void> serve(Exchange& exchange);

@@ -3,7 +3,6 @@
 #include <spdlog/spdlog.h>
 
 #include <stdexcept>
-#include <system_error>
 
 #include "service/jobs/stored_files.h"
 #include "service/storage/digest.h"
@@ -15,8 +14,7 @@ namespace fs = std::filesystem;
 
 /// Why a job failed that threw: a full disk can be helped, the rest is ours.
 Problem problem_of(const std::exception& thrown) {
-  const auto* error = dynamic_cast<const std::system_error*>(&thrown);
-  if (error && error->code() == std::errc::no_space_on_device)
+  if (is_of_full_disk(thrown))
     return {"insufficient-storage",
             "The disk was full while the job ran; free some space and submit it again."};
   return {"internal", "The job could not be finished; the fault is the service's, see its log."};

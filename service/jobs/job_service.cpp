@@ -319,6 +319,11 @@ void JobService::forget_expired() {
   state_->expiry.forget_expired();
 }
 
+std::optional<Problem> JobService::full_disk(const std::exception& failure) {
+  if (!is_of_full_disk(failure)) return std::nullopt;
+  return state_->no_room("The disk is full; try again when there is room.");
+}
+
 ServiceStatistics JobService::statistics() {
   ServiceStatistics found = state_->jobs.statistics();
   found.free_disk_bytes = state_->files.free_bytes();

@@ -183,6 +183,9 @@ class JobService {
   /// Removes what has been kept long enough; once started, it happens by itself within a second or two.
   void forget_expired();
 
+  /// insufficient-storage with the numbers, when that is why something failed.
+  std::optional<Problem> full_disk(const std::exception& failure);
+
   ServiceStatistics statistics();
   std::optional<std::string> not_ready_because();  ///< none: ready
 

@@ -257,7 +257,8 @@ std::optional<Job> JobStore::claim(std::int64_t most_memory_bytes, Work work, bo
 
 bool JobStore::change(const JobChange& change) {
   const auto step = [&](Database& database) { return change_in(database, change); };
-  return is_final(change.to) ? database_.write_at_any_rate(step) : database_.write(step);
+  // An attempt ends on a full disk as well; only a volume must not come onto it.
+  return change.retrieved ? database_.write(step) : database_.write_at_any_rate(step);
 }
 
 bool JobStore::change_in(Database& database, const JobChange& change) {

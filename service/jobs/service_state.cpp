@@ -361,9 +361,12 @@ tl::expected<void, Problem> JobService::State::check(const JobOrder& order) cons
 
 tl::expected<IncomingFile, Problem> JobService::State::begin_file(std::int64_t bytes) {
   if (auto file = files.receive(bytes)) return *std::move(file);
+  return tl::unexpected(no_room("The disk has too little free space for this upload."));
+}
+
+Problem JobService::State::no_room(std::string detail) {
   const std::int64_t free = files.available_bytes() - database.read(disk_bytes_of_unfinished);
-  return refuse("insufficient-storage", "The disk has too little free space for this upload.",
-                {{"free_bytes", std::max<std::int64_t>(free, 0)}});
+  return {"insufficient-storage", std::move(detail), {{"free_bytes", std::max<std::int64_t>(free, 0)}}};
 }
 
 tl::unexpected<Problem> JobService::State::over_quota(std::int64_t needed, std::int64_t used) const {

@@ -84,6 +84,7 @@ struct JobService::State {
   JobStore::QueueLimits queue_limits() const { return {settings.max_queued, settings.tenant_max_queued}; }
   /// A file to receive so many bytes into, on a disk that keeps room for the results of unfinished jobs.
   tl::expected<IncomingFile, Problem> begin_file(std::int64_t bytes);
+  Problem no_room(std::string detail);  ///< insufficient-storage, with what is free
   tl::unexpected<Problem> over_quota(std::int64_t needed, std::int64_t used) const;
   /// Whether the caller's tenant may keep so much more.
   tl::expected<void, Problem> within_quota(const Caller& caller, std::int64_t more_bytes);

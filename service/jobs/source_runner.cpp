@@ -3,7 +3,6 @@
 #include <spdlog/spdlog.h>
 
 #include <span>
-#include <system_error>
 
 #include "service/jobs/arrival_store.h"
 #include "service/jobs/ids.h"
@@ -21,8 +20,7 @@ NodeFailure no_room() {
 NodeFailure failure_of(const std::exception& thrown) {
   if (dynamic_cast<const DamagedFile*>(&thrown))
     return {{"integrity-failure", "What has arrived of the series is damaged; send it again."}, false};
-  const auto* error = dynamic_cast<const std::system_error*>(&thrown);
-  if (error && error->code() == std::errc::no_space_on_device) return no_room();
+  if (is_of_full_disk(thrown)) return no_room();
   return {{"internal", "The series could not be fetched; the fault is the service's, see its log."}, false};
 }
 

@@ -1,6 +1,16 @@
 #include "service/storage/disk_space.h"
 
+#include <system_error>
+
+#include "service/storage/database.h"
+
 namespace volsmooth {
+
+bool is_of_full_disk(const std::exception& failure) {
+  if (const auto* error = dynamic_cast<const DatabaseError*>(&failure)) return error->is_full_disk();
+  const auto* error = dynamic_cast<const std::system_error*>(&failure);
+  return error && error->code() == std::errc::no_space_on_device;
+}
 
 std::int64_t DiskSpace::available_bytes() const {
   const std::lock_guard lock(mutex_);

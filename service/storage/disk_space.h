@@ -1,10 +1,14 @@
 #pragma once
 
 #include <cstdint>
+#include <exception>
 #include <functional>
 #include <mutex>
 
 namespace volsmooth {
+
+/// Whether something failed because the disk is full: a file's ENOSPC, or what the database makes of it.
+bool is_of_full_disk(const std::exception& failure);
 
 /// The free space of a disk, promised to files before they are written, so that together they leave a
 /// reserve. Thread-safe.

@@ -23,12 +23,38 @@ class FullDisk : public testing::Test {
     if (mounted_) ::umount2(disk_.c_str(), MNT_DETACH);
   }
 
-  void fill() const {
+  static constexpr std::size_t kPage = 4096;
+  /// But for so many pages.
+  void fill(std::size_t pages_left = 0) const {
     std::ofstream filler(disk_ / "filler", std::ios::binary);
-    const std::string block(4096, 'x');
+    const std::string block(kPage, 'x');
     while (filler.write(block.data(), static_cast<std::streamsize>(block.size())).flush()) {
     }
-    ASSERT_EQ(fs::space(disk_).available, 0U);
+    filler.close();
+    fs::resize_file(disk_ / "filler", fs::file_size(disk_ / "filler") - pages_left * kPage);
+    ASSERT_EQ(fs::space(disk_).available, pages_left * kPage);
+  }
+
+  /// What an upload is answered under which the disk is filled to so many pages.
+  HttpResponse answer_when_filled(const Daemon& daemon, const std::string& file, bool chunked,
+                                  std::size_t pages_left) const {
+    HttpConnection connection(daemon.port());
+    const std::string length = std::to_string(file.size());
+    std::ostringstream in_hex;
+    in_hex << std::hex << file.size();
+    connection.send("POST /v1/volumes HTTP/1.1\r\nHost: localhost\r\n" +
+                    (chunked ? "Transfer-Encoding: chunked\r\n\r\n" + in_hex.str() + "\r\n"
+                             : "Content-Length: " + length + "\r\n\r\n") +
+                    file.substr(0, file.size() - 1));
+    EXPECT_TRUE(eventually([&] {
+      return std::ranges::any_of(fs::directory_iterator(daemon.data() / "tmp"),
+                                 [](const fs::directory_entry& entry) { return entry.file_size() > 0; });
+    }));
+    fill(pages_left);
+    connection.send(file.back() + std::string(chunked ? "\r\n0\r\n\r\n" : ""));
+    auto answer = connection.read().value();
+    fs::remove(disk_ / "filler");
+    return answer;
   }
 
   TemporaryDirectory folder_;
@@ -65,6 +91,25 @@ TEST_F(FullDisk, CanBeMadeRoomOn) {
   EXPECT_TRUE(eventually([&] { return fs::file_size(daemon.data() / "ballast") > 0; }))
       << "for the next time";
   EXPECT_EQ(service.run({{"volume", service.upload(ball_file(16)).at("id")}}).at("state"), "succeeded");
+}
+
+/// Also when the file has just found its place, and its row finds none.
+TEST_F(FullDisk, RefusesWhatItFillsUpUnderAndSaysWhy) {
+  Daemon daemon(VOLSMOOTHD, {}, disk_ / "data");
+  const ServiceClient service(daemon);
+  const std::string file = ball_file(24);  // of which 16 KiB, then the rest, are written
+  const std::size_t rest = (file.size() + kPage - 1) / kPage - 4;
+  for (const bool chunked : {false, true})
+    for (const std::size_t left : {std::size_t{0}, rest, rest + 1}) {
+      SCOPED_TRACE(std::to_string(left) + (chunked ? " pages left, chunked" : " pages left"));
+      const HttpResponse answer = answer_when_filled(daemon, file, chunked, left);
+      EXPECT_EQ(answer.status, 507) << answer.body;
+      EXPECT_EQ(answer.document().at("type"), "/problems/insufficient-storage");
+      EXPECT_EQ(answer.document().value("free_bytes", -1), 0);
+      EXPECT_TRUE(service.get("/v1/volumes").at("volumes").empty());
+      EXPECT_TRUE(eventually([&] { return service.call("GET", "/readyz").status == 200; }));
+    }
+  service.upload(file);
 }
 
 }  // namespace

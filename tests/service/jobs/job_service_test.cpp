@@ -13,6 +13,7 @@
 #include "service/storage/database.h"
 #include "service/storage/digest.h"
 #include "tests/service/jobs/service_fixture.h"
+#include "tests/support/disk_calls.h"
 
 namespace volsmooth {
 namespace {
@@ -463,6 +464,60 @@ TEST_F(JobServiceTest, ACommitOfUnknownOutcomeIsToldOnceAndEndsAllWriting) {
   open();
   EXPECT_TRUE(service_->volume(kAnyone, volume.id));
   EXPECT_TRUE(service_->submit(kAnyone, order_for(volume.id)));
+}
+
+/// Nobody knows whether the row will be there; the next start does.
+TEST_F(JobServiceTest, AVolumeWhoseCommitMayStandKeepsItsFile) {
+  open();
+  const auto files = [&] { return names_in(settings().data_dir / "volumes").size(); };
+  {
+    const DiskCalls disk(settings().data_dir,
+                         [](const std::string& call) { return call == "fsync volsmooth.db-wal" ? EIO : 0; });
+    EXPECT_THROW(upload(*service_, "x").value(), DatabaseError);
+  }
+  EXPECT_EQ(files(), 1U);
+  service_.reset();
+  open();
+  EXPECT_EQ(files(), service_->volumes(kAnyone)->volumes.size());
+}
+
+/// So that a power cut leaves a row only with its files.
+TEST_F(JobServiceTest, FilesAreOnTheDiskBeforeTheirRows) {
+  open_and_start();
+  DiskCalls disk(settings().data_dir);
+  const auto volume = upload(*service_, "x").value();
+  const Job job = wait_for(*service_, service_->submit(kAnyone, order_for(volume.id)).value().id);
+  const auto calls = disk.seen();
+  auto at = calls.begin();
+  const std::string part = "results/" + job.id + ".1.part";
+  for (const std::string& next :
+       {std::string("fsync volumes"), std::string("write volsmooth.db-wal"),
+        std::string("fsync volsmooth.db-wal"), "fsync " + part + "/out.nii.gz", "fsync " + part,
+        "rename " + part + " results/" + job.id + ".1", std::string("fsync results"),
+        std::string("write volsmooth.db-wal"), std::string("fsync volsmooth.db-wal")}) {
+    at = std::find(at, calls.end(), next);
+    ASSERT_NE(at, calls.end()) << next;
+  }
+}
+
+TEST_F(JobServiceTest, WhatDoesNotFitIntoTheDatabaseIsAFullDisk) {
+  open();
+  {
+    const DiskCalls disk(settings().data_dir, [](const std::string& call) {
+      return call == "write volsmooth.db-wal" ? ENOSPC : 0;
+    });
+    try {
+      upload(*service_, "x").value();
+      FAIL() << "there is no room";
+    } catch (const DatabaseError& error) {
+      const Problem problem = service_->full_disk(error).value();
+      EXPECT_EQ(problem.slug, "insufficient-storage");
+      EXPECT_GT(problem.members.at("free_bytes"), 0);
+    }
+  }
+  EXPECT_FALSE(service_->full_disk(std::runtime_error("no")));
+  EXPECT_TRUE(names_in(settings().data_dir / "volumes").empty());
+  EXPECT_TRUE(upload(*service_, "x"));
 }
 
 TEST_F(JobServiceTest, AStopEndsTheVerificationOfUploads) {

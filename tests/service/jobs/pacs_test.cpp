@@ -5,6 +5,7 @@
 #include <map>
 
 #include "tests/service/jobs/service_fixture.h"
+#include "tests/support/disk_calls.h"
 
 namespace volsmooth {
 namespace {
@@ -161,6 +162,18 @@ TEST_F(PacsJobs, ASeriesWhoseResultsMayNotFitOnTheDiskWaits) {
   EXPECT_TRUE(service_->volumes(kAnyone)->volumes.empty());
   const auto volumes = std::filesystem::directory_iterator(settings().data_dir / "volumes");
   EXPECT_EQ(std::distance(begin(volumes), end(volumes)), 0);
+}
+
+/// Until the ballast goes, which makes room for what says that it waits.
+TEST_F(PacsJobs, ASeriesWhoseRowDoesNotFitOnTheDiskWaits) {
+  open();
+  const DiskCalls disk(settings().data_dir, [this, full = true](const std::string& call) mutable {
+    if (call == "fsync ballast") full = false;
+    return full && node_.asked == 1 && call == "write volsmooth.db-wal" ? ENOSPC : 0;
+  });
+  const Job done = wait_for(*service_, service_->submit(kAnyone, source_order()).value().id);
+  EXPECT_EQ(done.state, JobState::kSucceeded) << (done.error ? done.error->slug : "");
+  EXPECT_EQ(node_.asked, 2);
 }
 
 TEST_F(PacsJobs, TheAuditSaysWhereADeliveryWent) {
