@@ -6,6 +6,7 @@
 
 #include "service/jobs/audit_seal.h"
 #include "tests/service/jobs/service_fixture.h"
+#include "tests/support/disk_calls.h"
 
 namespace volsmooth {
 namespace {
@@ -140,6 +141,58 @@ TEST_F(AuditTest, ASealFromBeforeTheLastCommitsIsNoFault) {
   open();
   add("v-3");
   EXPECT_EQ(fault(), "none");
+}
+
+TEST_F(AuditTest, EachCommitIsSealedWithAllItsRows) {
+  const auto sealed = [&] { return AuditSeal::read(file_).value(); };
+  for (int rows = 1; rows <= 4; ++rows) {
+    database_->write([&](Database& database) {
+      for (int row = 0; row < rows; ++row) audit(database, "v-1", "volume stored");
+      return true;
+    });
+    EXPECT_EQ(sealed(), database_->read(audit_head));
+    EXPECT_EQ(fs::file_size(scratch_ / "test.db.audit"), 96U) << "it never grows, also not on a full disk";
+  }
+}
+
+TEST_F(AuditTest, ARowThatIsNotCommittedIsNotSealed) {
+  add("v-1");
+  {
+    const DiskCalls disk(scratch_.path(),
+                         [](const std::string& call) { return call == "write test.db-wal" ? ENOSPC : 0; });
+    EXPECT_THROW(add("v-2"), DatabaseError);
+  }
+  EXPECT_EQ(fault(), "none");
+  database_.reset();
+  open();
+  EXPECT_EQ(rows().size(), 1U);
+}
+
+TEST_F(AuditTest, ASealThatCannotBeWrittenIsMadeUpForByTheNext) {
+  add("v-1");
+  {
+    const DiskCalls disk(scratch_.path(),
+                         [](const std::string& call) { return call == "write test.db.audit" ? EIO : 0; });
+    add("v-2");
+  }
+  add("v-3");
+  EXPECT_EQ(fault(), "none");
+  EXPECT_EQ(AuditSeal::read(file_)->sequence, 3);
+}
+
+TEST_F(AuditTest, TheDaemonNotesThatAllWasRewrittenSinceItsSeal) {
+  add("v-1");
+  const fs::path seal = scratch_ / "test.db.audit";
+  fs::copy_file(seal, scratch_ / "before");
+  tamper("DELETE FROM audit");
+  fs::remove(seal);
+  open();
+  add("v-2");  // a chain as good as the first
+  database_.reset();
+  fs::copy_file(scratch_ / "before", seal, fs::copy_options::overwrite_existing);
+  open();
+  add("v-3");  // which seals it
+  EXPECT_THAT(fault(), testing::HasSubstr("shortened or changed"));
 }
 
 TEST_F(AuditTest, AHeadNotedDownElsewhereShowsWhatWasRewrittenAltogether) {

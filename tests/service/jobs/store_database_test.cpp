@@ -9,6 +9,7 @@
 #include <thread>
 #include <vector>
 
+#include "tests/support/disk_calls.h"
 #include "tests/support/few_descriptors.h"
 #include "tests/support/scratch_folder.h"
 
@@ -104,6 +105,54 @@ TEST(StoreDatabaseTest, StepsThatFailLeaveNothingAndTheOthersAllTheirs) {
   EXPECT_FALSE(store.read([](Database& database) {
     return database.query("SELECT 1 FROM tombstones WHERE id % 100 % 3 = 0").step();
   }));
+}
+
+/// More than SQLite keeps in memory before it commits.
+void write_much(Database& database) {
+  database.run(
+      "INSERT INTO tombstones (id, deleted_ms) WITH RECURSIVE c(n) AS (SELECT 1 UNION ALL SELECT n + 1 "
+      "FROM c WHERE n < 40000) SELECT hex(zeroblob(100)) || n, n FROM c");
+}
+
+/// A full disk in the middle of a step undoes the steps before it as well, and those after it have no
+/// transaction left to be in.
+TEST(StoreDatabaseTest, WhatAFullDiskUndoesIsEverybodys) {
+  const ScratchFolder scratch;
+  StoreDatabase store(scratch.path() / "volsmooth.db");
+  std::atomic<int> failed = 0;
+  std::vector<std::jthread> threads;
+  const auto step = [&](const std::string& id, bool is_large) {
+    threads.emplace_back([&store, &failed, id, is_large] {
+      try {
+        store.write([&](Database& database) {
+          bury(database, id, "t", Burial::kDeleted, store.now());
+          if (is_large) write_much(database);
+          return true;
+        });
+      } catch (const DatabaseError& error) {
+        failed += error.is_full_disk();
+      }
+    });
+    std::this_thread::sleep_for(20ms);  // into the queue in this order
+  };
+  {
+    const DiskCalls disk(scratch.path(), [](const std::string& call) {
+      return call == "write volsmooth.db-wal" ? ENOSPC : 0;
+    });
+    EXPECT_THROW(store.write([&](Database&) {
+      step("before", false);
+      step("large", true);
+      step("after", false);
+      throw std::logic_error("only to hold up the others");
+      return true;
+    }),
+                 std::logic_error);
+    threads.clear();
+  }
+  EXPECT_EQ(failed, 3);
+  EXPECT_FALSE(store.condemned());
+  EXPECT_FALSE(
+      store.read([](Database& database) { return database.query("SELECT 1 FROM tombstones").step(); }));
 }
 
 /// At the same time, so that each has a reader of its own.

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include "tests/support/disk_calls.h"
 #include "tests/support/scratch_folder.h"
 
 namespace volsmooth {
@@ -38,6 +39,16 @@ TEST(Ballast, OfTheLastDaemonIsTakenOver) {
   ballast.lay();
   EXPECT_TRUE(ballast.drop());
   EXPECT_EQ(blocks_of(file), 0);
+}
+
+/// Blocks that a power cut would give back to the file are nobody else's yet.
+TEST(Ballast, IsDroppedOnceTheDiskKnows) {
+  const ScratchFolder scratch;
+  Ballast ballast(scratch.path() / "ballast", kBytes);
+  ballast.lay();
+  const DiskCalls disk(scratch.path(),
+                       [](const std::string& call) { return call == "fsync ballast" ? EIO : 0; });
+  EXPECT_FALSE(ballast.drop());
 }
 
 TEST(Ballast, IsDoneWithoutWhereItCannotBe) {

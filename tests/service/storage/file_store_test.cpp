@@ -1,5 +1,6 @@
 #include "service/storage/file_store.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -13,6 +14,7 @@
 #include <thread>
 
 #include "service/storage/digest.h"
+#include "tests/support/disk_calls.h"
 #include "tests/support/scratch_folder.h"
 
 namespace volsmooth {
@@ -100,6 +102,55 @@ TEST(FileStore, SweepsWhatNobodyWants) {
   }
   FileStore again(scratch.path());
   EXPECT_TRUE(names_in(scratch.path() / "tmp").empty());
+}
+
+// What a power cut leaves is what was synced: a name only when its directory was, and then all that it names.
+
+TEST(FileStore, WhatIsAdoptedIsOnTheDiskBeforeItsNameAndThenThatIs) {
+  const ScratchFolder scratch;
+  FileStore store(scratch.path());
+  for (const char* folder : {"volumes", "results"}) store.sweep(folder, kKeepAll);
+  IncomingFile file = received(store, "abc");
+  const std::string place = "tmp/" + file.path().filename().string();
+  store.begin_directory("results/job.1");
+  const DiskCalls disk(scratch.path());
+  store.adopt(std::move(file), "volumes/one");
+  store.adopt_directory("results/job.1");
+  store.remove("volumes/one");
+  EXPECT_THAT(disk.seen(),
+              testing::ElementsAre("fsync " + place, "rename " + place + " volumes/one", "fsync volumes",
+                                   "fsync results/job.1.part", "rename results/job.1.part results/job.1",
+                                   "fsync results", "fsync volumes"));
+}
+
+TEST(FileStore, ItsFoldersAreOnTheDiskOnceTheyAreMade) {
+  const ScratchFolder scratch;
+  const DiskCalls disk(scratch.path());
+  FileStore store(scratch.path() / "a/b");
+  store.sweep("volumes", kKeepAll);
+  EXPECT_THAT(disk.seen(), testing::IsSupersetOf({"fsync .", "fsync a", "fsync a/b", "fsync a/b/volumes"}));
+  EXPECT_EQ(disk.seen().back(), "fsync a/b");
+}
+
+TEST(FileStore, NothingStaysOfWhatCouldNotBeMadeDurable) {
+  const ScratchFolder scratch;
+  FileStore store(scratch.path());
+  for (const char* folder : {"volumes", "results"}) store.sweep(folder, kKeepAll);
+  const auto with_failing_call = [&](int failing, const auto& adopt) {
+    const DiskCalls disk(scratch.path(), [failing, calls = 0](const std::string&) mutable {
+      return ++calls == failing ? EIO : 0;
+    });
+    EXPECT_THROW(adopt(), std::system_error) << failing;
+  };
+  for (int failing = 1; failing <= 3; ++failing) {
+    IncomingFile file = received(store, "abc");
+    with_failing_call(failing, [&] { store.adopt(std::move(file), "volumes/one"); });
+    std::ofstream(store.begin_directory("results/job.1") / "a") << "b";
+    with_failing_call(failing, [&] { store.adopt_directory("results/job.1"); });
+    store.abandon_directory("results/job.1");
+    for (const char* folder : {"tmp", "volumes", "results"})
+      EXPECT_TRUE(names_in(scratch.path() / folder).empty()) << folder << failing;
+  }
 }
 
 /// A child adopts files as fast as it can, tells through the pipe which are stored, and is killed.

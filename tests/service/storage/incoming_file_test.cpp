@@ -120,6 +120,13 @@ TEST_F(IncomingFileOnADisk, IsNotInTheWayOfWhatAnotherWasPromised) {
   EXPECT_NO_THROW(write_text(declared, std::string(8 * kMiB, 'x')));
 }
 
+TEST_F(IncomingFileOnADisk, LeavesWhatIsHeldBackForOthers) {
+  disk_->hold_back([] { return 4 * kMiB; });
+  IncomingFile declared = file("a");
+  EXPECT_FALSE(declared.expect(kRoom - 4 * kMiB + 1));
+  EXPECT_TRUE(declared.expect(kRoom - 4 * kMiB));
+}
+
 TEST_F(IncomingFileOnADisk, GivesBackWhatItWasPromised) {
   {
     IncomingFile dropped = file("a");
