@@ -320,8 +320,13 @@ void JobService::forget_expired() {
 }
 
 std::optional<Problem> JobService::full_disk(const std::exception& failure) {
+  constexpr const char* kFull = "The disk is full; try again when there is room.";
   if (!is_of_full_disk(failure)) return std::nullopt;
-  return state_->no_room("The disk is full; try again when there is room.");
+  try {
+    return state_->no_room(kFull);
+  } catch (const DatabaseError&) {  // how much is free is not known then
+    return Problem{"insufficient-storage", kFull};
+  }
 }
 
 ServiceStatistics JobService::statistics() {
