@@ -7,9 +7,9 @@
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
-#include <numeric>
 #include <stdexcept>
-#include <utility>
+
+#include "service/pacs/configured.h"
 
 namespace volsmooth {
 namespace {
@@ -23,21 +23,6 @@ std::string text_of(const std::string& name, const json& value) {
                          "' must be a text, a number, true, false, or a list of these");
 }
 
-/// Levenshtein's distance: how many characters to change, add or leave out.
-std::size_t edits_between(const std::string& a, const std::string& b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t diagonal = std::exchange(row[0], i + 1);
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t changed = diagonal + (a[i] == b[j] ? 0 : 1);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({changed, row[j] + 1, diagonal + 1});
-    }
-  }
-  return row.back();
-}
-
 /// Options of a command line only.
 constexpr std::array<std::string_view, 4> kNotOfAFile = {"help", "version", "config", "print-config"};
 
@@ -48,12 +33,6 @@ json value_from(const std::string& text) {
 }
 
 }  // namespace
-
-std::string nearest_match(const std::string& name, const std::vector<std::string>& names) {
-  const auto edits = [&](const std::string& other) { return edits_between(name, other); };
-  const auto nearest = std::ranges::min_element(names, {}, edits);
-  return nearest != names.end() && edits(*nearest) <= 1 + name.size() / 3 ? *nearest : std::string();
-}
 
 std::vector<std::string> JsonConfiguration::members() const {
   std::vector<std::string> names{"nodes", "presets"};

@@ -41,7 +41,4 @@ void read_environment_files(const CLI::App& app);
 /// it.
 std::vector<std::string> unknown_variables(const CLI::App& app);
 
-/// The one of `names` that `name` is most likely a slip of the pen for; empty: none is near.
-std::string nearest_match(const std::string& name, const std::vector<std::string>& names);
-
 }  // namespace volsmooth

@@ -74,8 +74,8 @@ tl::expected<void, NodeFailure> DeliveryRunner::send(const DeliveryStore::Due& d
   for (auto first = pending.begin(); first != pending.end();) {
     const auto last = std::find_if(first, pending.end(),
                                    [&](const DicomInstance& other) { return other.result != first->result; });
-    auto sent =
-        pacs_.send(due.destination, place / first->result, std::span(first, last), record, keep_going);
+    auto sent = pacs_.send(job->tenant, due.destination, place / first->result, std::span(first, last),
+                           record, keep_going);
     if (!sent) return sent;
     first = last;
   }

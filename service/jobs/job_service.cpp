@@ -102,7 +102,9 @@ tl::expected<std::optional<std::string>, Problem> JobService::made_by(const Call
 tl::expected<std::vector<ArrivedInstance>, Problem> JobService::receive(const Caller& caller,
                                                                         std::string_view preset,
                                                                         IncomingFile file) {
-  if (std::ranges::find(state_->pacs.presets, preset, &Preset::name) == state_->pacs.presets.end())
+  const auto& presets = state_->pacs.presets;
+  const auto named = std::ranges::find(presets, preset, &Preset::name);
+  if (named == presets.end() || !state_->is_preset_of(*named, caller.tenant))
     return refuse("not-found", "The configuration has no such preset.");
   if (file.bytes() > state_->settings.max_upload_bytes) return too_large(state_->settings.max_upload_bytes);
   if (auto within = state_->within_quota(caller, file.bytes()); !within)
@@ -164,7 +166,8 @@ tl::expected<void, Problem> JobService::delete_volume(const Caller& caller, std:
 
 tl::expected<Job, Problem> JobService::submit(const Caller& caller, const JobOrder& order,
                                               const std::optional<RequestKey>& key) {
-  if (auto checked = state_->check(order); !checked) return tl::unexpected(std::move(checked.error()));
+  if (auto checked = state_->check(order, caller.tenant); !checked)
+    return tl::unexpected(std::move(checked.error()));
   const auto no_volume = [] {
     return refuse("not-found", "There is no such volume.", {{"member", "volume"}});
   };

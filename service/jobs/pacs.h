@@ -1,9 +1,12 @@
 #pragma once
 
+#include <algorithm>
 #include <filesystem>
 #include <functional>
+#include <iterator>
 #include <span>
 #include <string>
+#include <string_view>
 #include <tl/expected.hpp>
 #include <vector>
 
@@ -44,33 +47,48 @@ struct Preset {
   std::string tenant = kDefaultTenant;  ///< whose the series are that come by C-STORE
 };
 
+/// Whether what has these `tenants` in the configuration is that tenant's; without any it is everybody's.
+inline bool is_for(const std::vector<std::string>& tenants, std::string_view tenant) {
+  return tenants.empty() || std::ranges::find(tenants, tenant) != tenants.end();
+}
+
 /// The DICOM nodes and presets that the configuration names, handed to the service by main as plain functions
 /// (pacs/pacs.h makes them).
 struct Pacs {
   struct Node {
     std::string name;
-    bool gives = false;  ///< series can be retrieved from it
+    bool gives = false;                     ///< series can be retrieved from it
+    std::vector<std::string> tenants = {};  ///< who may name it; empty: everybody
   };
   std::vector<Node> nodes;
   std::vector<Preset> presets;
 
-  /// Retrieves a whole series into `file`, in a form that `Engine::inspect` reads. Checks that all instances
-  /// that the node lists came.
-  std::function<tl::expected<void, NodeFailure>(const DicomSource& source, IncomingFile& file,
-                                                const Progress& report)>
+  /// Retrieves a whole series for a tenant into `file`, in a form that `Engine::inspect` reads. Checks that
+  /// all instances that the node lists came.
+  std::function<tl::expected<void, NodeFailure>(const std::string& tenant, const DicomSource& source,
+                                                IncomingFile& file, const Progress& report)>
       retrieve;
 
   /// The instances that a result file of kind "series" or "dicom" holds.
   std::function<std::vector<DicomInstance>(const std::filesystem::path& file)> instances_in;
 
-  /// Sends those instances of a result file to a node. `on_answers` gets what the node says of each, as it
-  /// says it, and `keep_going` is called several times a second or so, from any thread; what they throw ends
-  /// the sending.
+  /// Sends those instances of a tenant's result file to a node. `on_answers` gets what the node says of each,
+  /// as it says it, and `keep_going` is called several times a second or so, from any thread; what they throw
+  /// ends the sending.
   std::function<tl::expected<void, NodeFailure>(
-      const std::string& node, const std::filesystem::path& file, std::span<const DicomInstance> instances,
+      const std::string& tenant, const std::string& node, const std::filesystem::path& file,
+      std::span<const DicomInstance> instances,
       const std::function<void(std::span<const InstanceAnswer>)>& on_answers,
       const std::function<void()>& keep_going)>
       send;
+
+  /// The nodes that a tenant may name; for it there are no others.
+  std::vector<Node> nodes_of(std::string_view tenant) const {
+    std::vector<Node> own;
+    std::ranges::copy_if(nodes, std::back_inserter(own),
+                         [&](const Node& node) { return is_for(node.tenants, tenant); });
+    return own;
+  }
 };
 
 }  // namespace volsmooth

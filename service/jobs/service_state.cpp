@@ -122,9 +122,21 @@ void JobService::State::check_presets() const {
   for (const Preset& preset : pacs.presets) {
     JobOrder order = preset.order;
     order.volume = "v-0";
-    if (const auto checked = check(order); !checked)
+    const auto is_its = [&](const Pacs::Node& node) { return node.name == order.destination; };
+    if (std::ranges::any_of(pacs.nodes, is_its) && !is_preset_of(preset, preset.tenant))
+      throw std::runtime_error(
+          "configuration, preset '" + preset.name + "': its tenant '" + preset.tenant +
+          "' may not use the node '" + order.destination +
+          "'; give the preset another 'tenant', or the node this one among its 'tenants'");
+    if (const auto checked = check(order, preset.tenant); !checked)
       throw std::runtime_error("configuration, preset '" + preset.name + "': " + checked.error().detail);
   }
+}
+
+bool JobService::State::is_preset_of(const Preset& preset, std::string_view tenant) const {
+  const auto nodes = pacs.nodes_of(tenant);
+  return preset.order.destination.empty() ||
+         std::ranges::find(nodes, preset.order.destination, &Pacs::Node::name) != nodes.end();
 }
 
 /// Files that no row points to: what was being written, or deleted, when the last daemon ended.
@@ -310,28 +322,30 @@ Job JobService::State::with_progress(Job job) const {
   return job;
 }
 
-/// The nodes that an order names are there and do what it wants of them.
-tl::expected<void, Problem> JobService::State::check_nodes(const JobOrder& order) const {
+/// The nodes that an order names are there for its tenant and do what it wants of them.
+tl::expected<void, Problem> JobService::State::check_nodes(const JobOrder& order,
+                                                           std::string_view tenant) const {
+  const std::vector<Pacs::Node> nodes = pacs.nodes_of(tenant);
   const auto unknown = [&](const std::string& member, const auto& does_it) -> tl::expected<void, Problem> {
     std::vector<std::string> names;
-    for (const Pacs::Node& node : pacs.nodes)
+    for (const Pacs::Node& node : nodes)
       if (std::invoke(does_it, node)) names.push_back(node.name);
     return refuse("bad-parameter",
                   "'" + member + "' must name a node of the service's configuration that can do this.",
                   {{"member", member}, {"choices", names}});
   };
   const auto find = [&](const std::string& name) {
-    return std::ranges::find(pacs.nodes, name, &Pacs::Node::name);
+    return std::ranges::find(nodes, name, &Pacs::Node::name);
   };
   if (order.source) {
     if (!order.volume.empty())
       return refuse("bad-parameter", "'source' must be given without 'volume': the two say the same thing.",
                     {{"member", "source"}});
-    if (const auto node = find(order.source->node); node == pacs.nodes.end() || !node->gives)
+    if (const auto node = find(order.source->node); node == nodes.end() || !node->gives)
       return unknown("source", &Pacs::Node::gives);
   }
   if (order.destination.empty()) return {};
-  if (find(order.destination) == pacs.nodes.end())
+  if (find(order.destination) == nodes.end())
     return unknown("destination", [](const Pacs::Node&) { return true; });
   if (std::ranges::none_of(order.outputs, [](const std::string& name) { return name.starts_with("dicom"); }))
     return refuse("bad-parameter",
@@ -341,7 +355,7 @@ tl::expected<void, Problem> JobService::State::check_nodes(const JobOrder& order
 }
 
 /// All about an order that can be said without its volume.
-tl::expected<void, Problem> JobService::State::check(const JobOrder& order) const {
+tl::expected<void, Problem> JobService::State::check(const JobOrder& order, std::string_view tenant) const {
   if (auto members = order_from(to_json(order)); !members) return tl::unexpected(std::move(members.error()));
   const auto method = std::ranges::find(engine.methods, order.method, &MethodInfo::name);
   if (method == engine.methods.end())
@@ -351,7 +365,7 @@ tl::expected<void, Problem> JobService::State::check(const JobOrder& order) cons
     if (std::ranges::find(engine.mesh_formats, name, &Engine::Format::name) == engine.mesh_formats.end())
       return refuse("bad-parameter", "'mesh_formats' must be a list of formats that GET /v1/formats lists.",
                     {{"member", "mesh_formats"}, {"choices", names_of(engine.mesh_formats)}});
-  if (auto nodes = check_nodes(order); !nodes) return nodes;
+  if (auto nodes = check_nodes(order, tenant); !nodes) return nodes;
   const auto days = settings.keep.count();
   if (days > 0 && order.keep_days && (*order.keep_days == 0 || *order.keep_days > days))
     return refuse("bad-parameter", "'keep_days' must be from 1 to " + std::to_string(days) + " here.",

@@ -80,7 +80,7 @@ struct JobService::State {
   /// it has made when it has a key.
   std::function<void(Database&)> making(const Caller& caller, std::int64_t added, std::int64_t to_come,
                                         const std::optional<RequestKey>& key, const std::string& id);
-  tl::expected<void, Problem> check(const JobOrder& order) const;
+  tl::expected<void, Problem> check(const JobOrder& order, std::string_view tenant) const;
   JobStore::QueueLimits queue_limits() const { return {settings.max_queued, settings.tenant_max_queued}; }
   /// A file to receive so many bytes into, on a disk that keeps room for the results of unfinished jobs.
   tl::expected<IncomingFile, Problem> begin_file(std::int64_t bytes);
@@ -91,7 +91,9 @@ struct JobService::State {
   /// In a transaction that has added so much to what a tenant keeps: throws Refused when it is too much, or
   /// when `to_come`, the results of a job, may not fit on the disk beside those of the other unfinished ones.
   void require_room(Database& database, const std::string& tenant, std::int64_t added, std::int64_t to_come);
-  tl::expected<void, Problem> check_nodes(const JobOrder& order) const;
+  tl::expected<void, Problem> check_nodes(const JobOrder& order, std::string_view tenant) const;
+  /// A preset is for whoever its destination is for.
+  bool is_preset_of(const Preset& preset, std::string_view tenant) const;
   tl::expected<StoredFile, Problem> stored_file(const std::string& name, const std::string& media_type,
                                                 std::int64_t bytes, const std::string& sha256);
 

@@ -59,7 +59,7 @@ tl::expected<StoredVolume, NodeFailure> SourceRunner::retrieve(ClaimedJob& claim
   report(0);
   if (!source.preset.empty()) {
     assemble(claim, file, report);
-  } else if (auto came = pacs_.retrieve(source, file, report); !came) {
+  } else if (auto came = pacs_.retrieve(claim.job().tenant, source, file, report); !came) {
     return tl::unexpected(std::move(came.error()));
   }
 

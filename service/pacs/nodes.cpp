@@ -11,6 +11,7 @@
 #include "service/dimse/channel.h"
 #include "service/jobs/ids.h"
 #include "service/pacs/ae_title.h"
+#include "service/pacs/configured.h"
 
 namespace volsmooth {
 namespace {
@@ -45,13 +46,19 @@ std::string credentials_from(const std::string& name, const std::filesystem::pat
 }
 
 /// Any other member is a mistake.
-void know(const json& object, const std::string& name, std::initializer_list<std::string_view> known) {
-  for (const auto& [member, value] : object.items()) {
-    if (std::ranges::find(known, member) != known.end()) continue;
-    std::string list;
-    for (const std::string_view one : known) list += (list.empty() ? "" : ", ") + std::string(one);
-    refuse_node(name, "'" + member + "' is not known; known are " + list);
-  }
+void know(const json& object, const std::string& name, const std::vector<std::string>& known) {
+  know_members(object, known, [&](const std::string& sentence) { refuse_node(name, sentence); });
+}
+
+std::vector<std::string> tenants_in(const json& node, const std::string& name) {
+  const auto found = node.find("tenants");
+  if (found == node.end()) return {};
+  auto tenants = texts_in(*found);
+  if (!tenants || !std::ranges::all_of(*tenants, is_id_shaped))
+    refuse_node(name,
+                "'tenants' must be a list of one or more names of 1 to 64 letters, digits, '-' and '_'; "
+                "without it, the node is everybody's");
+  return *std::move(tenants);
 }
 
 std::string ae_title_in(const json& peer, const std::string& name, const char* member) {
@@ -83,13 +90,15 @@ DimsePeer peer_from(const std::string& name, const json& configured) {
 Node node_from(const std::string& name, const json& configured) {
   if (!is_id_shaped(name)) refuse_node(name, "a name has 1 to 64 letters, digits, '-' and '_'");
   if (!configured.is_object()) refuse_node(name, "must be an object with 'dicomweb' or 'dimse'");
+  know(configured, name, {"dicomweb", "credentials_file", "dimse", "tenants"});
+  Node node{.name = name, .tenants = tenants_in(configured, name)};
   if (configured.contains("dimse")) {
-    if (configured.size() > 1) refuse_node(name, "a node with 'dimse' has no other member");
-    return {.name = name, .dimse = peer_from(name, configured["dimse"])};
+    if (configured.contains("dicomweb") || configured.contains("credentials_file"))
+      refuse_node(name, "a node with 'dimse' has no other member, but 'tenants'");
+    node.dimse = peer_from(name, configured["dimse"]);
+    return node;
   }
-  know(configured, name, {"dicomweb", "credentials_file", "dimse"});
-
-  Node node{name, text_in(configured, name, "dicomweb")};
+  node.url = text_in(configured, name, "dicomweb");
   if (!node.url.starts_with("http://") && !node.url.starts_with("https://"))
     refuse_node(name, "'dicomweb' must be an http:// or https:// address");
   if (node.url.find_first_of(" ?#") != std::string::npos)

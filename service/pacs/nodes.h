@@ -19,15 +19,17 @@ struct DimsePeer {
 /// to.
 struct Node {
   std::string name;
-  std::string url = {};                 ///< of its DICOMweb root, without a slash at the end
-  std::string login = {};               ///< "user:password" for Basic authentication; empty: none
-  std::string token = {};               ///< for Bearer authentication; empty: none
-  std::optional<DimsePeer> dimse = {};  ///< in place of all that
+  std::string url = {};                   ///< of its DICOMweb root, without a slash at the end
+  std::string login = {};                 ///< "user:password" for Basic authentication; empty: none
+  std::string token = {};                 ///< for Bearer authentication; empty: none
+  std::optional<DimsePeer> dimse = {};    ///< in place of all that
+  std::vector<std::string> tenants = {};  ///< who may name it; empty: everybody
 };
 
 /// Reads the member "nodes" of the configuration: `{name: {"dicomweb": url, "credentials_file": path}}` or
 /// `{name: {"dimse": {"host": name, "port": number, "aet": title, "calling_aet": title}}}`. The file of
 /// credentials holds one line, `user:password` (Basic) or a token (Bearer), and only its owner may read it.
+/// Both may have `"tenants": [name]`.
 /// Throws std::runtime_error with what is wrong and where.
 std::vector<Node> nodes_from(const nlohmann::json& configured);
 

@@ -7,6 +7,7 @@
 #include "service/jobs/ids.h"
 #include "service/jobs/job_json.h"
 #include "service/pacs/ae_title.h"
+#include "service/pacs/configured.h"
 
 namespace volsmooth {
 namespace {
@@ -46,6 +47,8 @@ std::string title_from(std::string name) {
 Preset preset_from(const std::string& name, const json& configured) {
   if (!is_id_shaped(name)) refuse_preset(name, "a name has 1 to 64 letters, digits, '-' and '_'");
   if (!configured.is_object()) refuse_preset(name, "must be an object with 'job' and 'destination'");
+  know_members(configured, {"job", "destination", "quiet_seconds", "aet", "tenant"},
+               [&](const std::string& sentence) { refuse_preset(name, sentence); });
   Preset preset{name, order_in(name, configured.value("job", json::object()))};
   preset.aet = title_from(name);
   for (const auto& [member, value] : configured.items()) {
@@ -62,9 +65,6 @@ Preset preset_from(const std::string& name, const json& configured) {
       if (!value.is_string() || !is_id_shaped(value.get_ref<const std::string&>()))
         refuse_preset(name, "'tenant' must be 1 to 64 letters, digits, '-' and '_'");
       preset.tenant = value;
-    } else if (member != "job") {
-      refuse_preset(
-          name, "'" + member + "' is not known; known are job, destination, quiet_seconds, aet and tenant");
     }
   }
   return preset;

@@ -54,9 +54,10 @@ TEST_F(OperatingTest, AMemberThatIsASlipOfThePenIsNamedWithWhatWasMeant) {
 }
 
 TEST_F(OperatingTest, PrintsTheConfigurationSoThatItCanBeUsedAsOne) {
-  const json given{{"workers", 5},
-                   {"host-name", {"one", "two"}},
-                   {"nodes", {{"pacs", {{"dicomweb", "http://127.0.0.1:1/dicom-web"}}}}}};
+  const json given{
+      {"workers", 5},
+      {"host-name", {"one", "two"}},
+      {"nodes", {{"pacs", {{"dicomweb", "http://127.0.0.1:1/dicom-web"}, {"tenants", {"ward-a"}}}}}}};
   const auto printed =
       run({"--data", "/d", "--config", file_with(given.dump()), "--memory", "2GB", "--print-config"},
           {"VOLSMOOTH_KEEP_DAYS=3"});

@@ -158,6 +158,57 @@ TEST(Tokens, LeaveNoWayToAnotherTenantsThings) {
   EXPECT_TRUE(tenants.is_untouched());
 }
 
+/// Nobody listens at either node: what is accepted waits.
+TEST(Tokens, LeaveNoWayToAnotherTenantsNodes) {
+  const TemporaryDirectory folder;
+  const auto configure = [&](const std::string& tenant) {
+    const json url = {{"dicomweb", "http://127.0.0.1:1"}};
+    json theirs = url;
+    theirs["tenants"] = {tenant};
+    const json preset = {{"destination", "theirs"}, {"tenant", tenant}};
+    write_file(
+        folder / "configuration.json",
+        json{{"nodes", {{"common", url}, {"theirs", theirs}}}, {"presets", {{"head", preset}}}}.dump());
+  };
+  configure("ward-a");
+  Daemon daemon(VOLSMOOTHD, {"--config", (folder / "configuration.json").string()});
+  const std::string owner = make_token(daemon.data(), "owner", "admin", {"--tenant", "ward-a"});
+  const std::string stranger = make_token(daemon.data(), "stranger", "admin", {"--tenant", "ward-b"});
+  const auto call = [&](const std::string& token, const std::string& method, const std::string& target,
+                        const std::string& body = {}) {
+    const char* const type = target == "/v1/jobs" ? "application/json" : "application/dicom";
+    return HttpConnection(daemon.port())
+        .exchange(method, target, body, {{"Authorization", "Bearer " + token}, {"Content-Type", type}});
+  };
+  const auto submit = [&](const std::string& token, const std::string& from, const std::string& to) {
+    const json source = {{"dicomweb", from}, {"study", "1.2.3"}, {"series", "1.2.3.4"}};
+    return call(token, "POST", "/v1/jobs",
+                json{{"source", source}, {"destination", to}, {"outputs", {"dicom-series"}}}.dump());
+  };
+  for (const auto& [from, to] : {std::pair("theirs", "common"), {"common", "theirs"}}) {
+    EXPECT_EQ(submit(owner, from, to).status, 202);
+    const HttpResponse refused = submit(stranger, from, to);
+    const auto or_none = [](std::string node) { return node == "theirs" ? "nobody" : node; };
+    EXPECT_EQ(refused.status, 422);
+    EXPECT_EQ(refused.body, submit(stranger, or_none(from), or_none(to)).body);
+    EXPECT_THAT(refused.body, Not(HasSubstr("theirs")));
+  }
+  EXPECT_EQ(call(stranger, "POST", "/dicomweb/head/studies", "x").body,
+            call(stranger, "POST", "/dicomweb/foot/studies", "x").body);
+  EXPECT_EQ(call(owner, "POST", "/dicomweb/head/studies", "x").status, 422) << "no DICOM, but its preset";
+
+  daemon.terminate();
+  configure("ward-b");
+  daemon.start();
+  const auto failed = [&] { return call(owner, "GET", "/v1/jobs?state=failed").document().at("jobs"); };
+  ASSERT_TRUE(eventually([&] { return failed().size() == 1; }));
+  EXPECT_EQ(failed()[0].at("order").at("source").at("dicomweb"), "theirs");
+  EXPECT_EQ(failed()[0].at("error").at("detail"),
+            "The configuration has no node 'theirs' any more that can do this.");
+  EXPECT_EQ(submit(owner, "theirs", "common").status, 422);
+  EXPECT_EQ(submit(stranger, "theirs", "common").status, 202);
+}
+
 TEST(Tls, IsWhatTheClientAndTheDaemonSpeak) {
   const TemporaryDirectory folder;
   const std::string certificate = folder / "cert.pem", key = folder / "key.pem";

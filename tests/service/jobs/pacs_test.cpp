@@ -21,15 +21,17 @@ struct FakeNode {
   std::mutex mutex;
   std::vector<std::string> received;
   std::string refuses;
+  std::string asked_for;  ///< the tenant of the last exchange
 
   static NodeFailure down() { return {{"node-unreachable", "It is down."}, true}; }
 
   Pacs pacs() {
     Pacs pacs;
     pacs.nodes = {{"archive", true}, {"printer", false}};
-    pacs.retrieve = [this](const DicomSource&, IncomingFile& file,
+    pacs.retrieve = [this](const std::string& tenant, const DicomSource&, IncomingFile& file,
                            const Progress& report) -> tl::expected<void, NodeFailure> {
       ++asked;
+      asked_for = tenant;
       report(0.5);
       if (!up) return tl::unexpected(down());
       if (!has_series) return tl::unexpected(NodeFailure{{"source-not-found", "Not there."}, false});
@@ -41,10 +43,11 @@ struct FakeNode {
       const std::string stem = file.filename();
       return std::vector<DicomInstance>{{"1.2", stem + ".1", {}}, {"1.2", stem + ".2", {}}};
     };
-    pacs.send = [this](const std::string&, const std::filesystem::path&,
+    pacs.send = [this](const std::string& tenant, const std::string&, const std::filesystem::path&,
                        std::span<const DicomInstance> instances, const auto& on_answers,
                        const auto& keep_going) -> tl::expected<void, NodeFailure> {
       ++asked;
+      asked_for = tenant;
       for (int tries = 0; silent && tries < 6000; ++tries) {
         keep_going();
         std::this_thread::sleep_for(10ms);
@@ -80,6 +83,11 @@ class PacsJobs : public JobServiceTest {
       return std::vector<Result>{FakeEngine::result("out.zip", "series"),
                                  FakeEngine::result("report.json", "report")};
     };
+    if (fake_instances_)
+      engine.instances = [](const auto&) -> tl::expected<std::vector<ArrivedInstance>, Problem> {
+        return std::vector<ArrivedInstance>{{"1.2", "1.2.3", "1.2.3.4", "1.2.3.4.5", 0, 1}};
+      };
+    service_.reset();
     JobServiceSettings given = settings();
     given.longest_node_pause = 20ms;
     given.node_patience = patience_;
@@ -113,6 +121,7 @@ class PacsJobs : public JobServiceTest {
   std::optional<Pacs> pacs_;  ///< in place of the node's
   std::chrono::milliseconds patience_ = 1h;
   std::int64_t quota_ = 0;
+  bool fake_instances_ = false;  ///< any file holds one
   std::string seen_volume_;
 };
 
@@ -259,6 +268,105 @@ TEST_F(PacsJobs, WhatNamesANodeThatTheConfigurationLostFails) {
   open();
   EXPECT_EQ(wait_for(*service_, waiting).error->detail, "It is gone.");
   EXPECT_EQ(delivered(undelivered, DeliveryState::kFailed).delivery->error->detail, "It is gone.");
+}
+
+/// The two nodes are ward-a's; what is there for everybody is "common", that for ward-b is "b".
+class NodesOfTenants : public PacsJobs {
+ protected:
+  NodesOfTenants() {
+    pacs_ = node_.pacs();
+    for (Pacs::Node& node : pacs_->nodes) node.tenants = {"ward-a"};
+    pacs_->nodes.push_back({"common", true});
+    pacs_->nodes.push_back({"b", true, {"ward-c", "ward-b"}});
+    open();
+  }
+  /// What a caller is told who names that node, as the source or as the destination.
+  std::string told(const Caller& caller, const std::string& node, bool as_source) {
+    JobOrder order = source_order();
+    order.outputs = {"dicom-series"};
+    order.source->node = as_source ? node : "common";
+    if (!as_source) order.destination = node;
+    const auto answer = service_->submit(caller, order);
+    return answer ? "taken" : answer.error().slug + answer.error().detail + answer.error().members.dump();
+  }
+  auto send_to_preset(const Caller& caller, const std::string& preset) {
+    auto file = service_->begin_arrival().value();
+    return service_->receive(caller, preset, std::move(file));
+  }
+
+  const Caller alice_{"ward-a", "", {Scope::kAdmin}}, bob_{"ward-b", "", {Scope::kAdmin}};
+};
+
+TEST_F(NodesOfTenants, AnothersNodeAnswersLikeOneThatIsNotThere) {
+  for (const bool as_source : {true, false}) {
+    const std::string none = told(bob_, "nobody", as_source);
+    EXPECT_THAT(none, HasSubstr(R"("choices":["common","b"])"));
+    EXPECT_EQ(told(bob_, "archive", as_source), none);
+    EXPECT_EQ(told(bob_, "printer", as_source), none);
+    EXPECT_EQ(told(alice_, "b", as_source), told(alice_, "nobody", as_source));
+    for (const char* node : {"b", "common"}) EXPECT_EQ(told(bob_, node, as_source), "taken");
+    for (const char* node : {"archive", "common"}) EXPECT_EQ(told(alice_, node, as_source), "taken");
+    EXPECT_EQ(told(kAnyone, "common", as_source), "taken");
+    EXPECT_EQ(told(kAnyone, "archive", as_source), told(kAnyone, "printer1", as_source));
+  }
+  EXPECT_EQ(told(alice_, "printer", false), "taken");
+}
+
+/// So the network's side, which knows the nodes, refuses what is not the tenant's any more.
+TEST_F(NodesOfTenants, NodesAreAskedInTheNameOfTheJobsTenant) {
+  JobOrder order = source_order();
+  order.outputs = {"dicom-series"};
+  order.destination = "printer";
+  node_.silent = true;
+  const std::string id = service_->submit(alice_, order).value().id;
+  const auto wait_until_asked = [&](int times) {
+    for (int tries = 0; tries < 6000 && node_.asked < times; ++tries) std::this_thread::sleep_for(10ms);
+    EXPECT_GE(node_.asked, times);
+  };
+  wait_until_asked(1);
+  while (service_->job(alice_, id)->state != JobState::kSucceeded) std::this_thread::sleep_for(1ms);
+  EXPECT_EQ(service_->volumes(alice_)->volumes.size(), 1U);
+  wait_until_asked(2);
+  service_.reset();
+  EXPECT_EQ(node_.asked_for, "ward-a");
+}
+
+/// Its order is the operator's, but what it sends, and in whose name, is its caller's.
+TEST_F(NodesOfTenants, APresetIsForWhoeverItsDestinationIsFor) {
+  pacs_->presets = {{"to-a", JobOrder{}}, {"to-all", JobOrder{}}, {"to-none", JobOrder{}}};
+  for (auto& [preset, node] :
+       std::vector<std::pair<std::size_t, std::string>>{{0, "printer"}, {1, "common"}}) {
+    pacs_->presets[preset].order.outputs = {"dicom-series"};
+    pacs_->presets[preset].order.destination = node;
+  }
+  pacs_->presets[0].tenant = "ward-a";
+  fake_instances_ = true;
+  open();
+  const auto none = send_to_preset(bob_, "nobody");
+  const auto others = send_to_preset(bob_, "to-a");
+  EXPECT_EQ(slug_of(none), "not-found");
+  EXPECT_EQ(slug_of(others), "not-found");
+  EXPECT_EQ(others.error().detail, none.error().detail);
+  EXPECT_EQ(slug_of(send_to_preset(alice_, "to-a")), "none");
+  for (const Caller& caller : {alice_, bob_})
+    for (const char* preset : {"to-all", "to-none"})
+      EXPECT_EQ(slug_of(send_to_preset(caller, preset)), "none");
+}
+
+TEST_F(NodesOfTenants, APresetWhoseTenantMayNotUseItsNodeStopsTheStart) {
+  pacs_->presets = {{"head", JobOrder{}}};
+  pacs_->presets[0].order.outputs = {"dicom-series"};
+  pacs_->presets[0].order.destination = "printer";
+  service_.reset();
+  try {
+    open();
+    FAIL() << "it started";
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(),
+                HasSubstr("preset 'head': its tenant 'default' may not use the node 'printer'"));
+  }
+  pacs_->presets[0].tenant = "ward-a";
+  EXPECT_NO_THROW(open());
 }
 
 TEST_F(PacsJobs, AMissingSeriesIsNotAskedForAgain) {

@@ -58,6 +58,17 @@ TEST_F(Nodes, APeerIsAHostAPortAndAnAeTitle) {
   EXPECT_EQ(nodes_from(ours)[0].dimse->calling, "SMOOTHER");
 }
 
+TEST_F(Nodes, AreEverybodysOrOfTenants) {
+  const json two = {"ward-a", "ward-b"};
+  const auto nodes = nodes_from(json{{"a", {{"dicomweb", "http://p"}}},
+                                     {"b", {{"dicomweb", "http://p"}, {"tenants", two}}},
+                                     {"c", {{"dimse", peer(json::object()).at("dimse")}, {"tenants", two}}}});
+  EXPECT_TRUE(nodes[0].tenants.empty());
+  for (const Node& node : {nodes[1], nodes[2]})
+    EXPECT_THAT(node.tenants, testing::ElementsAre("ward-a", "ward-b"));
+  EXPECT_TRUE(nodes[2].dimse);
+}
+
 /// DCMTK would connect to what is left of a longer one.
 TEST_F(Nodes, APeerHasAnAddressOf63CharactersAtMost) {
   const auto with = [](std::size_t host_length, int port) {
@@ -85,6 +96,12 @@ TEST_F(Nodes, WhatIsWrongIsRefusedWithItsPlace) {
       {{{"p", {{"dicomweb", "file:///etc"}}}}, "'dicomweb' must be an http"},
       {{{"p", {{"dicomweb", "http://p?x=1"}}}}, "without a query"},
       {{{"p", {{"dicomweb", "http://p"}, {"tls", true}}}}, "'tls' is not known"},
+      {{{"p", {{"dicomweb", "http://p"}, {"tenant", {"a"}}}}}, "did you mean 'tenants'?"},
+      {{{"p", {{"dicomweb", "http://p"}, {"tenants", "a"}}}}, "'tenants' must be a list of one or more"},
+      {{{"p", {{"dicomweb", "http://p"}, {"tenants", json::array()}}}}, "'tenants' must be a list of one"},
+      {{{"p", {{"dicomweb", "http://p"}, {"tenants", {"a", 5}}}}}, "'tenants' must be a list of one or"},
+      {{{"p", {{"dicomweb", "http://p"}, {"tenants", {"a", "b c"}}}}}, "'tenants' must be a list of one or"},
+      {{{"p", {{"dimse", json::object()}, {"tenants", nullptr}}}}, "'tenants' must be a list of one or"},
       {{{"p", {{"dicomweb", "http://p"}, {"credentials_file", "/nowhere"}}}}, "cannot be read"},
       {{{"p", {{"dicomweb", "http://p"}, {"credentials_file", file_with("t", 0640)}}}}, "owner's alone"},
       {{{"p", {{"dicomweb", "http://p"}, {"dimse", json::object()}}}}, "has no other member"},

@@ -37,6 +37,17 @@ TEST(Presets, ABadTitleIsRefused) {
                 testing::HasSubstr("preset 'bone': 'aet' must be an AE title"));
 }
 
+TEST(Presets, AnUnknownMemberIsNamedWithWhatWasMeant) {
+  EXPECT_THAT(refusal_of([] {
+                presets_from(json{{"bone", {{"destinaton", "pacs"}}}});
+              }),
+              testing::HasSubstr("preset 'bone': 'destinaton' is not known; known are job, destination, "));
+  EXPECT_THAT(refusal_of([] {
+                presets_from(json{{"bone", {{"destinaton", "pacs"}}}});
+              }),
+              testing::EndsWith("; did you mean 'destination'?"));
+}
+
 TEST(Presets, BelongToATenant) {
   const auto presets = presets_from(json{{"bone", {{"tenant", "ward-a"}}}, {"skin", json::object()}});
   EXPECT_EQ(presets[0].tenant, "ward-a");
