@@ -126,8 +126,8 @@ void declare(CLI::App& app, Options& options) {
                  "A name by which clients address this daemon, beside localhost; repeatable")
       ->envname("VOLSMOOTH_HOST_NAME");
   app.add_flag("--allow-open-dimse", options.allow_open_dimse,
-               "Allows --dimse-listen on addresses that others than this machine reach; DIMSE knows no "
-               "access control")
+               "Allows --dimse-listen on addresses that others than this machine reach; of DIMSE, only "
+               "the presets' 'from' is access control")
       ->envname("VOLSMOOTH_ALLOW_OPEN_DIMSE");
   app.add_flag("--allow-open-network", options.server.allow_open_network,
                "Allows to listen on addresses that others than this machine reach, without TLS or tokens")
@@ -198,7 +198,8 @@ void reload_tls(Server& server) {
 }
 
 /// Devices speak DIMSE with it; what comes is kept by the jobs.
-void listen_for_devices(const Options& options, JobService& jobs, std::optional<DimseListener>& listener) {
+void listen_for_devices(const Options& options, JobService& jobs, Metrics& metrics,
+                        std::optional<DimseListener>& listener) {
   if (options.dimse_listen.empty()) return;
   Inbox inbox;
   inbox.begin = [&jobs] { return jobs.begin_arrival(); };
@@ -208,10 +209,10 @@ void listen_for_devices(const Options& options, JobService& jobs, std::optional<
     return jobs.receive(device, name, std::move(file));
   };
   inbox.max_bytes = options.jobs.max_upload_bytes;
-  listener.emplace(
-      DimseListener::Settings{options.dimse_listen, options.allow_open_dimse,
-                              presets_by_title(options.presets), log_event, log_warning, log_error},
-      std::move(inbox));
+  listener.emplace(DimseListener::Settings{options.dimse_listen, options.allow_open_dimse,
+                                           presets_by_title(options.presets), log_event, log_warning,
+                                           log_error, [&metrics] { metrics.association_refused(); }},
+                   std::move(inbox));
   log_event("dimse-ready", "listening for DICOM associations on " + listener->address());
 }
 
@@ -253,7 +254,7 @@ void serve(const Options& options) {
   std::optional<ControlSocket> control;
   listen_for_commands(options, jobs, control);
   std::optional<DimseListener> listener;
-  listen_for_devices(options, jobs, listener);
+  listen_for_devices(options, jobs, metrics, listener);
   jobs.start();
   log_event("ready", "volsmoothd " VOLSMOOTH_VERSION " listening on " + server.address());
 

@@ -61,6 +61,10 @@ struct Metrics::State {
       family<Counter>(registry, prometheus::BuildCounter, "volsmooth_refused_handshakes_total",
                       "TLS connections of strangers that were closed because they were too many.")
           .Add({});
+  Counter& refused_associations =
+      family<Counter>(registry, prometheus::BuildCounter, "volsmooth_refused_associations_total",
+                      "DICOM associations of callers whom no preset, or not the one they called, expects.")
+          .Add({});
   Gauge& uploads = gauges("volsmooth_uploads_receiving", "Uploads that are being received.").Add({});
 };
 
@@ -95,6 +99,10 @@ std::shared_ptr<void> Metrics::upload_begins() {
 
 void Metrics::handshake_refused() {
   state_->refused_handshakes.Increment();
+}
+
+void Metrics::association_refused() {
+  state_->refused_associations.Increment();
 }
 
 std::string Metrics::text(const ServiceStatistics& now) {

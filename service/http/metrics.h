@@ -23,7 +23,8 @@ class Metrics {
   /// Counts an upload as being received as long as the handle lives.
   std::shared_ptr<void> upload_begins();
 
-  void handshake_refused();  ///< of TLS, to a stranger who asked for too many
+  void handshake_refused();    ///< of TLS, to a stranger who asked for too many
+  void association_refused();  ///< of DICOM, to one who may not call
 
   /// Prometheus' text format, with the gauges as of now.
   std::string text(const ServiceStatistics& now);

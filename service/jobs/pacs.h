@@ -45,6 +45,9 @@ struct Preset {
   std::chrono::milliseconds quiet = std::chrono::seconds(10);
   std::string aet = {};                 ///< the AE title that devices call it by; empty: none
   std::string tenant = kDefaultTenant;  ///< whose the series are that come by C-STORE
+  // Who may send by C-STORE; empty: everybody, from anywhere.
+  std::vector<std::string> callers = {};  ///< AE titles
+  std::vector<std::string> from = {};     ///< IPv4 networks, such as "10.1.0.0/16"
 };
 
 /// Whether what has these `tenants` in the configuration is that tenant's; without any it is everybody's.

@@ -5,6 +5,7 @@
 #include <poll.h>
 #include <sys/socket.h>
 
+#include <algorithm>
 #include <stdexcept>
 
 #include "service/pacs/ae_title.h"
@@ -23,22 +24,31 @@ constexpr auto kLook = 100ms;  ///< how often a stop is looked for
 // Beyond the limits that volsmooth-dimse keeps itself.
 constexpr auto kRequestPatience = 60s, kIdlePatience = 330s;
 
-constexpr std::uint32_t kAccepted = 0, kNoSuchTitle = 0x0107;
+constexpr std::uint32_t kAccepted = 0, kNoSuchTitle = 0x0107, kNoSuchCaller = 0x0103;
 /// An A-ASSOCIATE-RJ: transient, by the presentation service, local limit exceeded (DICOM PS3.8, 9.3.4).
 constexpr char kBusy[] = {3, 0, 0, 0, 0, 4, 0, 2, 3, 2};
+/// Permanent, by the service user: kNoSuchCaller.
+constexpr char kStranger[] = {3, 0, 0, 0, 0, 4, 0, 1, 1, 3};
 
-/// Without the spaces that say nothing; what is no AE title stays out of the log.
+/// Without the spaces that say nothing.
 std::string title_in(const json& request, const char* member) {
   std::string title = request.at(member);
   while (title.ends_with(' ')) title.pop_back();
   title.erase(0, title.find_first_not_of(' '));
+  return title;
+}
+
+/// What is no AE title stays out of the log.
+std::string logged(const std::string& title) {
   return is_ae_title(title) ? title : "?";
 }
 
 }  // namespace
 
 struct DimseListener::Served {
-  explicit Served(int connection) : child("receive", connection) {}
+  Served(int connection, const boost::asio::ip::address_v4& from)
+      : address(from), child("receive", connection) {}
+  const boost::asio::ip::address_v4 address;
   DimseChild child;
   std::atomic<bool> has_ended = false;
   std::jthread thread = {};  // joined before the child goes
@@ -47,16 +57,17 @@ struct DimseListener::Served {
 struct DimseListener::Tally {
   std::string called = "?", calling = "?";
   int stored = 0, refused = 0;
+  bool is_stranger = false;
 };
 
-std::map<std::string, std::string> presets_by_title(const std::vector<Preset>& presets) {
-  std::map<std::string, std::string> found;
+std::map<std::string, CalledPreset> presets_by_title(const std::vector<Preset>& presets) {
+  std::map<std::string, CalledPreset> found;
   for (const Preset& preset : presets) {
     if (preset.aet.empty())
       throw std::runtime_error("configuration, preset '" + preset.name +
                                "': its name is too long for an AE title; give it one as 'aet'");
-    if (const auto [other, is_new] = found.emplace(preset.aet, preset.name); !is_new)
-      throw std::runtime_error("configuration: the presets '" + other->second + "' and '" + preset.name +
+    if (const auto [other, is_new] = found.try_emplace(preset.aet, preset.name, Callers(preset)); !is_new)
+      throw std::runtime_error("configuration: the presets '" + other->second.name + "' and '" + preset.name +
                                "' have the same AE title, " + preset.aet);
   }
   return found;
@@ -85,27 +96,43 @@ void DimseListener::accept_all(const std::stop_token& stopped) {
     turned_away_.look();
     pollfd polled{listening_.socket.get(), POLLIN, 0};
     if (::poll(&polled, 1, static_cast<int>(kLook.count())) <= 0) continue;
-    FileDescriptor connection(::accept4(listening_.socket.get(), nullptr, nullptr, SOCK_CLOEXEC));
+    sockaddr_in peer{};
+    socklen_t size = sizeof peer;
+    FileDescriptor connection(
+        ::accept4(listening_.socket.get(), reinterpret_cast<sockaddr*>(&peer), &size, SOCK_CLOEXEC));
     if (connection.get() < 0) {
       std::this_thread::sleep_for(kLook);  // no descriptors are left, or it went away again
       continue;
     }
     try {
-      begin(std::move(connection));
+      begin(std::move(connection), boost::asio::ip::address_v4(ntohl(peer.sin_addr.s_addr)));
     } catch (const std::exception& error) {
       settings_.log_error("dimse-fault", error.what());
     }
   }
 }
 
-void DimseListener::begin(FileDescriptor connection) {
+/// Counts one who may not call, and says so.
+std::string DimseListener::told_of_stranger(const std::string& who) const {
+  settings_.on_stranger();
+  return "rejected: " + who + " may not call";
+}
+
+/// Who comes from where no preset expects anybody gets neither a process nor one of the places.
+void DimseListener::begin(FileDescriptor connection, const boost::asio::ip::address_v4& address) {
+  const auto expects = [&](const auto& preset) { return preset.second.callers.may_come_from(address); };
+  if (std::ranges::none_of(settings_.presets, expects)) {
+    settings_.log_warning("dimse-association", told_of_stranger(address.to_string()));
+    turned_away_.add(std::move(connection), {kStranger, sizeof kStranger});
+    return;
+  }
   if (served_.size() >= kAssociations) {
     turned_away_.add(std::move(connection), {kBusy, sizeof kBusy});
     return;
   }
   const int yes = 1;
   ::setsockopt(connection.get(), IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
-  Served& served = served_.emplace_back(connection.get());
+  Served& served = served_.emplace_back(connection.get(), address);
   try {
     served.thread = std::jthread([this, &served] {
       serve(served);
@@ -126,24 +153,36 @@ void DimseListener::serve(Served& served) {
   } catch (const std::exception&) {  // its volsmooth-dimse is gone, or says what it must not
     broken_off = true;
   }
-  const auto& log = broken_off || tally.refused > 0 ? settings_.log_warning : settings_.log;
+  const auto& log =
+      broken_off || tally.is_stranger || tally.refused > 0 ? settings_.log_warning : settings_.log;
   log("dimse-association", "from " + tally.calling + " to " + tally.called + ": " +
                                std::to_string(tally.stored) + " stored, " + std::to_string(tally.refused) +
                                " refused, " + end);
 }
 
 /// How it ended.
-const char* DimseListener::talk(Served& served, Tally& tally) {
+std::string DimseListener::talk(Served& served, Tally& tally) {
   Channel channel = served.child.channel();
   const json request = channel.receive_document(kRequestPatience);
   if (request.contains("failure")) return "broken off by a fault of the service's";
-  tally.calling = title_in(request, "calling");
-  tally.called = title_in(request, "called");
-  const auto preset = settings_.presets.find(tally.called);
-  if (preset == settings_.presets.end()) {
-    channel.send({{"reject", kNoSuchTitle}});
+  const std::string calling = title_in(request, "calling"), called = title_in(request, "called");
+  tally.calling = logged(calling);
+  tally.called = logged(called);
+  const auto preset = settings_.presets.find(called);
+  const auto reject = [&](std::uint32_t reason) {
+    channel.send({{"reject", reason}});
     channel.receive(kRequestPatience);  // until it has
+  };
+  if (preset == settings_.presets.end()) {
+    reject(kNoSuchTitle);
     return "rejected";
+  }
+  if (const Callers& callers = preset->second.callers;
+      !callers.may_be(calling) || !callers.may_come_from(served.address)) {
+    tally.is_stranger = true;
+    const std::string told = told_of_stranger(tally.calling + " at " + served.address.to_string());
+    reject(kNoSuchCaller);
+    return told;
   }
   channel.send({{"reject", kAccepted}});
   Arrivals arrivals(inbox_);
@@ -155,7 +194,7 @@ const char* DimseListener::talk(Served& served, Tally& tally) {
     const json said = document_of(*message);
     if (said.contains("released")) return "released";
     if (said.contains("alive")) continue;
-    const std::uint16_t status = keep(arrivals, preset->second, said);
+    const std::uint16_t status = keep(arrivals, preset->second.name, said);
     ++(is_stored(status) ? tally.stored : tally.refused);
     channel.send({{"status", status}});
   }

@@ -10,14 +10,21 @@
 
 #include "service/jobs/pacs.h"
 #include "service/pacs/arrivals.h"
+#include "service/pacs/callers.h"
 #include "service/pacs/listening_socket.h"
 #include "service/pacs/turned_away.h"
 
 namespace volsmooth {
 
+/// A preset as devices see it.
+struct CalledPreset {
+  std::string name;
+  Callers callers;
+};
+
 /// The presets by the AE titles that devices call them by. Throws std::runtime_error for one that has none,
 /// and for two that have the same.
-std::map<std::string, std::string> presets_by_title(const std::vector<Preset>& presets);
+std::map<std::string, CalledPreset> presets_by_title(const std::vector<Preset>& presets);
 
 /// Takes what devices send by C-STORE; the AE title that they call is the preset that runs on it. Each
 /// association has a volsmooth-dimse of its own, so what a peer sends can end that association alone.
@@ -26,9 +33,10 @@ class DimseListener {
   struct Settings {
     std::string listen;  ///< ADDRESS:PORT
     bool allow_open_network = false;
-    std::map<std::string, std::string> presets;  ///< by AE title
+    std::map<std::string, CalledPreset> presets;  ///< by AE title
     using Log = std::function<void(std::string_view event, const std::string& message)>;
     Log log, log_warning, log_error;
+    std::function<void()> on_stranger;  ///< one who may not call was turned away
   };
 
   /// Listens at once. Throws std::runtime_error with a sentence that says what to change.
@@ -42,10 +50,12 @@ class DimseListener {
   struct Tally;
 
   void accept_all(const std::stop_token& stopped);
-  void begin(FileDescriptor connection);
+  void begin(FileDescriptor connection, const boost::asio::ip::address_v4& address);
   void serve(Served& served);
-  const char* talk(Served& served, Tally& tally);
+  std::string talk(Served& served, Tally& tally);
   std::uint16_t keep(Arrivals& arrivals, const std::string& preset, const nlohmann::json& announced);
+
+  std::string told_of_stranger(const std::string& who) const;
 
   const Settings settings_;
   const Inbox inbox_;

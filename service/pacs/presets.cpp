@@ -7,6 +7,7 @@
 #include "service/jobs/ids.h"
 #include "service/jobs/job_json.h"
 #include "service/pacs/ae_title.h"
+#include "service/pacs/callers.h"
 #include "service/pacs/configured.h"
 
 namespace volsmooth {
@@ -47,7 +48,7 @@ std::string title_from(std::string name) {
 Preset preset_from(const std::string& name, const json& configured) {
   if (!is_id_shaped(name)) refuse_preset(name, "a name has 1 to 64 letters, digits, '-' and '_'");
   if (!configured.is_object()) refuse_preset(name, "must be an object with 'job' and 'destination'");
-  know_members(configured, {"job", "destination", "quiet_seconds", "aet", "tenant"},
+  know_members(configured, {"job", "destination", "quiet_seconds", "aet", "tenant", "callers", "from"},
                [&](const std::string& sentence) { refuse_preset(name, sentence); });
   Preset preset{name, order_in(name, configured.value("job", json::object()))};
   preset.aet = title_from(name);
@@ -65,8 +66,13 @@ Preset preset_from(const std::string& name, const json& configured) {
       if (!value.is_string() || !is_id_shaped(value.get_ref<const std::string&>()))
         refuse_preset(name, "'tenant' must be 1 to 64 letters, digits, '-' and '_'");
       preset.tenant = value;
+    } else if (member == "callers" || member == "from") {
+      auto texts = texts_in(value);
+      if (!texts) refuse_preset(name, "'" + member + "' must be a list of one text or more");
+      (member == "from" ? preset.from : preset.callers) = *std::move(texts);
     }
   }
+  const Callers checked(preset);
   return preset;
 }
 

@@ -52,7 +52,7 @@ const std::map<std::string, std::vector<std::string>> kMayInclude = {
 /// Libraries that only the named directories may see.
 const std::map<std::string, std::vector<std::string>> kLibraryHomes = {
     {"itk", {"algorithms/volume"}},
-    {"boost/", {"service/http"}},
+    {"boost/", {"service/http", "service/pacs"}},
     {"sqlite3", {"service/storage"}},
     {"spdlog/", {"service", "service/http", "service/jobs"}},
     {"prometheus/", {"service/http"}},

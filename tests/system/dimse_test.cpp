@@ -71,7 +71,9 @@ class Dimse : public testing::Test {
               {"stranger", dimse("STRANGER")}}},
             {"presets",
              {{"head",
-               {{"job", {{"isovalues", json::array()}}}, {"destination", "cstore"}, {"quiet_seconds", 5}}}}}};
+               {{"job", {{"isovalues", json::array()}}}, {"destination", "cstore"}, {"quiet_seconds", 5}}},
+              {"ct", {{"callers", {"CT1"}}, {"from", {"127.0.0.0/8"}}}},
+              {"mr", {{"callers", {"STORESCU"}}, {"from", {"10.0.0.0/8"}}}}}}};
   }
 
   /// What storescu ends with.
@@ -262,6 +264,15 @@ TEST_F(Dimse, RejectsATitleThatIsNoPreset) {
   EXPECT_EQ(std::filesystem::exists(daemon_->data() / "arrivals") &&
                 !std::filesystem::is_empty(daemon_->data() / "arrivals"),
             false);
+}
+
+TEST_F(Dimse, RejectsACallerWhomThePresetDoesNotName) {
+  for (const char* title : {"CT", "MR"}) {
+    EXPECT_NE(store(port_, title, {files_.front()}), 0);
+    EXPECT_THAT(content_of(folder_ / "storescu"), testing::HasSubstr("Calling AE Title Not Recognized"));
+  }
+  EXPECT_THAT(client().call("GET", "/metrics").body,
+              testing::HasSubstr("volsmooth_refused_associations_total 2"));
 }
 
 TEST_F(Dimse, RefusesAnInstanceThatItCannotUnderstand) {

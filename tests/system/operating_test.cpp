@@ -57,7 +57,8 @@ TEST_F(OperatingTest, PrintsTheConfigurationSoThatItCanBeUsedAsOne) {
   const json given{
       {"workers", 5},
       {"host-name", {"one", "two"}},
-      {"nodes", {{"pacs", {{"dicomweb", "http://127.0.0.1:1/dicom-web"}, {"tenants", {"ward-a"}}}}}}};
+      {"nodes", {{"pacs", {{"dicomweb", "http://127.0.0.1:1/dicom-web"}, {"tenants", {"ward-a"}}}}}},
+      {"presets", {{"head", {{"callers", {"CT1"}}, {"from", {"10.1.0.0/16"}}}}}}};
   const auto printed =
       run({"--data", "/d", "--config", file_with(given.dump()), "--memory", "2GB", "--print-config"},
           {"VOLSMOOTH_KEEP_DAYS=3"});
@@ -68,6 +69,7 @@ TEST_F(OperatingTest, PrintsTheConfigurationSoThatItCanBeUsedAsOne) {
   EXPECT_EQ(in_force.at("keep-days"), 3);
   EXPECT_EQ(in_force.at("listen"), "127.0.0.1:8742");
   EXPECT_EQ(in_force.at("nodes"), given.at("nodes"));
+  EXPECT_EQ(in_force.at("presets"), given.at("presets"));
   const auto again = run({"--config", file_with(printed.output), "--print-config"});
   ASSERT_EQ(again.exit_code, 0) << again.errors;
   EXPECT_EQ(json::parse(again.output), in_force);

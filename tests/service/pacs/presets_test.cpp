@@ -59,9 +59,32 @@ TEST(Presets, BelongToATenant) {
                 testing::HasSubstr("'tenant' must be"));
 }
 
+TEST(Presets, AreForEverybodyOrForCallers) {
+  const auto presets = presets_from(
+      json{{"bone", {{"callers", {"CT1", "CT 2"}}, {"from", {"10.1.0.0/16"}}}}, {"skin", json::object()}});
+  EXPECT_THAT(presets[0].callers, testing::ElementsAre("CT1", "CT 2"));
+  EXPECT_THAT(presets[0].from, testing::ElementsAre("10.1.0.0/16"));
+  EXPECT_TRUE(presets[1].callers.empty() && presets[1].from.empty());
+  const std::vector<std::pair<json, std::string>> table = {
+      {{{"caller", {"CT1"}}}, "did you mean 'callers'?"},
+      {{{"callers", "CT1"}}, "'callers' must be a list of one text or more"},
+      {{{"callers", json::array()}}, "'callers' must be a list of one text or more"},
+      {{{"callers", {"CT1", "SEVENTEEN_LETTERS"}}}, "each of 'callers' must be an AE title"},
+      {{{"callers", {"CT1 "}}}, "no space at either end"},
+      {{{"from", json::array()}}, "'from' must be a list of one text or more"},
+      {{{"from", {"10.1.0.5/16"}}}, "did you mean '10.1.0.0/16'?"},
+  };
+  for (const auto& [configured, expected] : table)
+    EXPECT_THAT(refusal_of([&] {
+                  presets_from(json{{"bone", configured}});
+                }),
+                testing::AllOf(testing::HasSubstr("preset 'bone': "), testing::HasSubstr(expected)));
+}
+
 TEST(Presets, ATitleIsOneOnly) {
-  EXPECT_EQ(presets_by_title(presets_from(json{{"bone", json::object()}})),
-            (std::map<std::string, std::string>{{"BONE", "bone"}}));
+  const auto titles = presets_by_title(presets_from(json{{"bone", json::object()}}));
+  ASSERT_EQ(titles.size(), 1U);
+  EXPECT_EQ(titles.at("BONE").name, "bone");
   EXPECT_THAT(refusal_of([] {
                 presets_by_title(presets_from(json{{"bone", json::object()}, {"skin", {{"aet", "BONE"}}}}));
               }),
