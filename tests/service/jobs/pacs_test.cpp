@@ -27,7 +27,7 @@ struct FakeNode {
   static NodeFailure down() { return {{"node-unreachable", "It is down."}, true}; }
 
   void note(const std::string& tenant) {
-    const std::lock_guard lock(mutex_);
+    const std::lock_guard lock(mutex);
     ++asked;
     askers.insert(tenant);
   }
