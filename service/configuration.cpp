@@ -103,11 +103,9 @@ std::vector<CLI::ConfigItem> JsonConfiguration::from_config(std::istream& input)
       continue;
     }
     const auto known = members();
-    if (std::ranges::count(known, name) == 0) {
-      const std::string nearest = nearest_match(name, known);
+    if (std::ranges::count(known, name) == 0)
       throw CLI::ConfigError("the configuration has a member that is not known: '" + name + "'" +
-                             (nearest.empty() ? "" : "; did you mean '" + nearest + "'?"));
-    }
+                             did_you_mean(name, known));
     // CLI11 itself would let the file come before the environment.
     const std::string variable = app_.get_option("--" + name)->get_envname();
     if (!variable.empty() && std::getenv(variable.c_str()) != nullptr) continue;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <filesystem>
 #include <functional>
-#include <iterator>
 #include <span>
 #include <string>
 #include <string_view>
@@ -85,12 +84,10 @@ struct Pacs {
       const std::function<void()>& keep_going)>
       send;
 
-  /// The nodes that a tenant may name; for it there are no others.
-  std::vector<Node> nodes_of(std::string_view tenant) const {
-    std::vector<Node> own;
-    std::ranges::copy_if(nodes, std::back_inserter(own),
-                         [&](const Node& node) { return is_for(node.tenants, tenant); });
-    return own;
+  /// The node of that name that a tenant may use; null: for it there is none.
+  const Node* node_of(std::string_view tenant, std::string_view name) const {
+    const auto found = std::ranges::find(nodes, name, &Node::name);
+    return found != nodes.end() && is_for(found->tenants, tenant) ? &*found : nullptr;
   }
 };
 

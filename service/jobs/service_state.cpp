@@ -134,9 +134,7 @@ void JobService::State::check_presets() const {
 }
 
 bool JobService::State::is_preset_of(const Preset& preset, std::string_view tenant) const {
-  const auto nodes = pacs.nodes_of(tenant);
-  return preset.order.destination.empty() ||
-         std::ranges::find(nodes, preset.order.destination, &Pacs::Node::name) != nodes.end();
+  return preset.order.destination.empty() || pacs.node_of(tenant, preset.order.destination);
 }
 
 /// Files that no row points to: what was being written, or deleted, when the last daemon ended.
@@ -325,27 +323,23 @@ Job JobService::State::with_progress(Job job) const {
 /// The nodes that an order names are there for its tenant and do what it wants of them.
 tl::expected<void, Problem> JobService::State::check_nodes(const JobOrder& order,
                                                            std::string_view tenant) const {
-  const std::vector<Pacs::Node> nodes = pacs.nodes_of(tenant);
   const auto unknown = [&](const std::string& member, const auto& does_it) -> tl::expected<void, Problem> {
     std::vector<std::string> names;
-    for (const Pacs::Node& node : nodes)
-      if (std::invoke(does_it, node)) names.push_back(node.name);
+    for (const Pacs::Node& node : pacs.nodes)
+      if (is_for(node.tenants, tenant) && std::invoke(does_it, node)) names.push_back(node.name);
     return refuse("bad-parameter",
                   "'" + member + "' must name a node of the service's configuration that can do this.",
                   {{"member", member}, {"choices", names}});
-  };
-  const auto find = [&](const std::string& name) {
-    return std::ranges::find(nodes, name, &Pacs::Node::name);
   };
   if (order.source) {
     if (!order.volume.empty())
       return refuse("bad-parameter", "'source' must be given without 'volume': the two say the same thing.",
                     {{"member", "source"}});
-    if (const auto node = find(order.source->node); node == nodes.end() || !node->gives)
+    if (const auto* node = pacs.node_of(tenant, order.source->node); !node || !node->gives)
       return unknown("source", &Pacs::Node::gives);
   }
   if (order.destination.empty()) return {};
-  if (find(order.destination) == nodes.end())
+  if (!pacs.node_of(tenant, order.destination))
     return unknown("destination", [](const Pacs::Node&) { return true; });
   if (std::ranges::none_of(order.outputs, [](const std::string& name) { return name.starts_with("dicom"); }))
     return refuse("bad-parameter",

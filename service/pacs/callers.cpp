@@ -1,32 +1,28 @@
 #include "service/pacs/callers.h"
 
 #include <algorithm>
-#include <stdexcept>
 
 #include "service/pacs/ae_title.h"
+#include "service/pacs/configured.h"
 
 namespace volsmooth {
 namespace {
 
 namespace ip = boost::asio::ip;
 
-[[noreturn]] void refuse_callers(const Preset& preset, const std::string& what) {
-  throw std::runtime_error("configuration, preset '" + preset.name + "': " + what);
-}
-
 ip::network_v4 network_in(const Preset& preset, const std::string& text) {
   const std::string full = text.find('/') == std::string::npos ? text + "/32" : text;
   boost::system::error_code error;
   const ip::network_v4 network = ip::make_network_v4(full, error);
   if (error)
-    refuse_callers(preset,
-                   "'from' must be a list of IPv4 addresses and networks, such as 10.1.2.3 and "
-                   "10.1.0.0/16, and '" +
-                       text + "' is neither");
+    refuse_preset(preset.name,
+                  "'from' must be a list of IPv4 addresses and networks, such as 10.1.2.3 and "
+                  "10.1.0.0/16, and '" +
+                      text + "' is neither");
   const std::string canonical = network.canonical().to_string();
   if (canonical != full)
-    refuse_callers(preset,
-                   "'from' has '" + text + "', which is no network; did you mean '" + canonical + "'?");
+    refuse_preset(preset.name,
+                  "'from' has '" + text + "', which is no network; did you mean '" + canonical + "'?");
   return network;
 }
 
@@ -38,7 +34,7 @@ bool contains(const ip::network_v4& network, const ip::address_v4& address) {
 
 Callers::Callers(const Preset& preset) : titles_(preset.callers) {
   if (!std::ranges::all_of(titles_, is_ae_title))
-    refuse_callers(preset, std::string("each of 'callers' must be ") + kAeTitleRule);
+    refuse_preset(preset.name, std::string("each of 'callers' must be ") + kAeTitleRule);
   for (const std::string& text : preset.from) networks_.push_back(network_in(preset, text));
 }
 

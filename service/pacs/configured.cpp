@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <stdexcept>
 #include <utility>
 
 namespace volsmooth {
@@ -32,15 +33,22 @@ std::string nearest_match(const std::string& name, const std::vector<std::string
   return nearest != names.end() && edits(*nearest) <= 1 + name.size() / 3 ? *nearest : std::string();
 }
 
+std::string did_you_mean(const std::string& name, const std::vector<std::string>& names) {
+  const std::string nearest = nearest_match(name, names);
+  return nearest.empty() ? nearest : "; did you mean '" + nearest + "'?";
+}
+
+void refuse_preset(const std::string& name, const std::string& what) {
+  throw std::runtime_error("configuration, preset '" + name + "': " + what);
+}
+
 void know_members(const json& object, const std::vector<std::string>& known,
                   const std::function<void(const std::string& sentence)>& refuse) {
   for (const auto& [member, value] : object.items()) {
     if (std::ranges::find(known, member) != known.end()) continue;
     std::string list;
     for (const std::string& one : known) list += (list.empty() ? "" : ", ") + one;
-    const std::string nearest = nearest_match(member, known);
-    refuse("'" + member + "' is not known; known are " + list +
-           (nearest.empty() ? "" : "; did you mean '" + nearest + "'?"));
+    refuse("'" + member + "' is not known; known are " + list + did_you_mean(member, known));
   }
 }
 

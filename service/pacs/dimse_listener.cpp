@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "service/pacs/ae_title.h"
+#include "service/pacs/configured.h"
 #include "service/pacs/dimse_answers.h"
 #include "service/pacs/dimse_child.h"
 
@@ -64,8 +65,7 @@ std::map<std::string, CalledPreset> presets_by_title(const std::vector<Preset>& 
   std::map<std::string, CalledPreset> found;
   for (const Preset& preset : presets) {
     if (preset.aet.empty())
-      throw std::runtime_error("configuration, preset '" + preset.name +
-                               "': its name is too long for an AE title; give it one as 'aet'");
+      refuse_preset(preset.name, "its name is too long for an AE title; give it one as 'aet'");
     if (const auto [other, is_new] = found.try_emplace(preset.aet, preset.name, Callers(preset)); !is_new)
       throw std::runtime_error("configuration: the presets '" + other->second.name + "' and '" + preset.name +
                                "' have the same AE title, " + preset.aet);

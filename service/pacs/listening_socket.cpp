@@ -58,8 +58,7 @@ ListeningSocket listen_for_dimse(const std::string& listen, bool allow_open_netw
     fail("refusing to listen for DIMSE on " + text_of(endpoint) +
          ": DIMSE authenticates nobody, so everyone who reaches that address could have jobs run. Listen on "
          "127.0.0.1, or add --allow-open-dimse when the presets' 'from', or something in front of it, does "
-         "the "
-         "checking.");
+         "the checking.");
   FileDescriptor socket(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   const int yes = 1;
   ::setsockopt(socket.get(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);

@@ -15,10 +15,6 @@ namespace {
 
 using nlohmann::json;
 
-[[noreturn]] void refuse_preset(const std::string& name, const std::string& what) {
-  throw std::runtime_error("configuration, preset '" + name + "': " + what);
-}
-
 JobOrder order_in(const std::string& name, json job) {
   if (!job.is_object()) refuse_preset(name, "'job' must be an order without a volume, such as {}");
   for (const char* member : {"volume", "source", "destination"})

@@ -18,11 +18,12 @@ constexpr const char* kWriterSettings = R"(
   PRAGMA secure_delete = ON;
   PRAGMA wal_autocheckpoint = 4000;
 )";
-constexpr std::size_t kMostIdle = 256;
 constexpr const char* kReaderSettings = R"(
   PRAGMA query_only = ON;
   PRAGMA wal_autocheckpoint = 0;
 )";
+
+constexpr std::size_t kMostIdle = 256;
 
 [[noreturn]] void throw_error(sqlite3* connection, int code) {
   throw DatabaseError(code & 0xff, connection ? sqlite3_errmsg(connection) : sqlite3_errstr(code));
@@ -47,7 +48,7 @@ IdleStatements::~IdleStatements() {
 }
 
 sqlite3_stmt* IdleStatements::take(std::string_view sql) {
-  const auto found = by_sql_.find(std::string(sql));
+  const auto found = by_sql_.find(sql);
   if (found == by_sql_.end()) return nullptr;
   sqlite3_stmt* const statement = found->second;
   by_sql_.erase(found);

@@ -5,13 +5,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
 #include <type_traits>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -44,7 +45,7 @@ class IdleStatements {
   void give_back(sqlite3_stmt* statement);   ///< without its values
 
  private:
-  std::unordered_multimap<std::string, sqlite3_stmt*> by_sql_;
+  std::multimap<std::string, sqlite3_stmt*, std::less<>> by_sql_;
 };
 
 /// One prepared statement with its values bound; read row by row. Its connection outlives it.
