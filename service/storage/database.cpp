@@ -1,6 +1,9 @@
 #include "service/storage/database.h"
 
 #include <sqlite3.h>
+#include <unistd.h>
+
+#include <cerrno>
 
 namespace volsmooth {
 namespace {
@@ -24,6 +27,21 @@ constexpr const char* kReaderSettings = R"(
 )";
 
 constexpr std::size_t kMostIdle = 256;
+
+/// SQLite knows a full disk by ENOSPC alone. To it anything else may be a commit of unknown outcome, for
+/// which the process has to end; a quota that is used up is none.
+ssize_t write_within_quota(int file, const void* bytes, std::size_t count, off_t at) {
+  const ssize_t written = ::pwrite(file, bytes, count, at);
+  if (written < 0 && errno == EDQUOT) errno = ENOSPC;
+  return written;
+}
+
+void take_used_up_quotas_for_full_disks() {
+  sqlite3_vfs* const files = sqlite3_vfs_find(nullptr);
+  static_assert(sizeof(off_t) == sizeof(sqlite3_int64));
+  for (const char* const name : {"pwrite", "pwrite64"})  // it was built with either
+    files->xSetSystemCall(files, name, reinterpret_cast<sqlite3_syscall_ptr>(&write_within_quota));
+}
 
 [[noreturn]] void throw_error(sqlite3* connection, int code) {
   throw DatabaseError(code & 0xff, connection ? sqlite3_errmsg(connection) : sqlite3_errstr(code));
@@ -131,6 +149,8 @@ void Database::Close::operator()(sqlite3* connection) const {
 }
 
 Database::Database(const std::filesystem::path& file, Access access) {
+  static const bool once = (take_used_up_quotas_for_full_disks(), true);
+  static_cast<void>(once);
   const bool writes = access == Access::kWriter;
   const int flags = (writes ? SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE : SQLITE_OPEN_READONLY) |
                     SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_EXRESCODE;

@@ -1,5 +1,6 @@
 #include "service/storage/disk_space.h"
 
+#include <cerrno>
 #include <system_error>
 
 #include "service/storage/database.h"
@@ -9,7 +10,8 @@ namespace volsmooth {
 bool is_of_full_disk(const std::exception& failure) {
   if (const auto* error = dynamic_cast<const DatabaseError*>(&failure)) return error->is_full_disk();
   const auto* error = dynamic_cast<const std::system_error*>(&failure);
-  return error && error->code() == std::errc::no_space_on_device;
+  return error && (error->code() == std::errc::no_space_on_device ||
+                   error->code() == std::error_code(EDQUOT, std::generic_category()));
 }
 
 std::int64_t DiskSpace::available_bytes() const {

@@ -7,7 +7,8 @@
 
 namespace volsmooth {
 
-/// Whether something failed because the disk is full: a file's ENOSPC, or what the database makes of it.
+/// Whether something failed because the disk is full, or a quota of it: a file's ENOSPC or EDQUOT, or what
+/// the database makes of it.
 bool is_of_full_disk(const std::exception& failure);
 
 /// The free space of a disk, promised to files before they are written, so that together they leave a

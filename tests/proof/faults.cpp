@@ -2,7 +2,8 @@
 // STRIDE, ... until the whole of upload, job, results and deletion happens before the n-th; once and until
 // further notice, with every error that the call can have; also while the daemon starts. Nothing acknowledged
 // may be lost, no call may take longer than 5 s, every refusal is a problem document, and 5 s after the fault
-// all is well again.
+// all is well again. Every kind of fault meets a data directory of its own: what earlier ones left in it
+// would only add calls to each.
 #include <cstdio>
 #include <cstring>
 #include <functional>
@@ -29,32 +30,46 @@ struct Fault {
 const std::vector<Fault> kFaults{
     {"disk full once", kDiskCalls & ~(kReadCall | kSyncCall | kRemoveCall), ENOSPC, false},
     {"disk full", kDiskCalls & ~(kReadCall | kSyncCall | kRemoveCall), ENOSPC, true},
+    {"quota used up", kDiskCalls & ~(kReadCall | kSyncCall | kRemoveCall), EDQUOT, true},
     {"I/O error once", kDiskCalls, EIO, false},
     {"I/O errors", kDiskCalls, EIO, true},
     {"no descriptor once", kOpenCall | kAcceptCall | kNewDescriptorCall, EMFILE, false},
     {"no descriptors", kOpenCall | kNewDescriptorCall, EMFILE, true},  // else nobody could be told
 };
 
-class Proof {
+struct Tally {
+  std::int64_t injected = 0, orderly_ends = 0, refusals = 0;
+  double slowest = 0, slowest_recovery = 0;
+  std::size_t findings = 0;
+};
+
+enum class Moment { kRequests, kStart };
+
+/// One kind of fault at one moment, for every n.
+class Sweep {
  public:
-  Proof(const std::filesystem::path& shim, std::int64_t stride)
-      : stride_(stride),
+  Sweep(const std::filesystem::path& shim, const Fault& fault, Moment moment, Tally& tally)
+      : fault_(fault),
+        moment_(moment),
+        name_(fault.name + (moment == Moment::kStart ? " at the start" : "")),
+        tally_(tally),
         faults_(directory_ / "plan"),
         daemon_(start_under(shim)),
         file_(gzip(ball_file(12))) {}
 
-  bool run() {
-    for (const Fault& fault : kFaults) {
-      sweep(fault, [&] { live(); });
-      sweep(fault, [&] { restart(); });
+  void run(std::int64_t stride) {
+    for (number_ = 1;; number_ += stride) {
+      faults_.fail(fault_.calls, fault_.error, number_, fault_.lasting ? INT64_MAX : number_);
+      moment_ == Moment::kStart ? restart() : live();
+      faults_.disarm();
+      const bool met = faults_.counted() >= number_;
+      recover();
+      if (!met) break;
+      ++tally_.injected;
     }
+    std::printf("%s: to call %lld\n", name_.c_str(), static_cast<long long>(number_));
+    std::fflush(stdout);
     finish();
-    std::printf(
-        "%lld faults, %lld orderly ends, %lld refusals, slowest call %.2f s, slowest recovery %.2f s, %zu "
-        "findings\n",
-        static_cast<long long>(injected_), static_cast<long long>(orderly_ends_),
-        static_cast<long long>(refusals_), slowest_, slowest_recovery_, findings_);
-    return findings_ == 0;
   }
 
  private:
@@ -67,22 +82,9 @@ class Proof {
   }
 
   void find(const std::string& what) {
-    ++findings_;
-    std::printf("FOUND, %s, call %lld: %s\n", fault_.c_str(), static_cast<long long>(number_), what.c_str());
+    ++tally_.findings;
+    std::printf("FOUND, %s, call %lld: %s\n", name_.c_str(), static_cast<long long>(number_), what.c_str());
     std::fflush(stdout);
-  }
-
-  void sweep(const Fault& fault, const std::function<void()>& act) {
-    fault_ = fault.name;
-    for (number_ = 1;; number_ += stride_) {
-      faults_.fail(fault.calls, fault.error, number_, fault.lasting ? INT64_MAX : number_);
-      act();
-      faults_.disarm();
-      const bool met = faults_.counted() >= number_;
-      recover();
-      if (!met) break;
-      ++injected_;
-    }
   }
 
   /// Calls like a client does: none when there was no answer.
@@ -97,14 +99,14 @@ class Proof {
     } catch (const std::runtime_error&) {
     }
     const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
-    slowest_ = std::max(slowest_, seconds);
+    tally_.slowest = std::max(tally_.slowest, seconds);
     if (seconds > 5) find(method + " " + target + " took " + std::to_string(seconds) + " s");
     if (answer && answer->status >= 400) look_at_refusal(method + " " + target, *answer);
     return answer;
   }
 
   void look_at_refusal(const std::string& what, const HttpResponse& answer) {
-    ++refusals_;
+    ++tally_.refusals;
     static const std::set<std::string> sensible{
         "/problems/insufficient-storage", "/problems/internal",          "/problems/not-ready",
         "/problems/store-unavailable",    "/problems/integrity-failure", "/problems/volume-in-use",
@@ -174,8 +176,8 @@ class Proof {
       daemon_.kill();
       daemon_.start();
     }
-    slowest_recovery_ =
-        std::max(slowest_recovery_, std::chrono::duration<double>(Clock::now() - start).count());
+    tally_.slowest_recovery =
+        std::max(tally_.slowest_recovery, std::chrono::duration<double>(Clock::now() - start).count());
     const ServiceClient service(daemon_);
     try {
       service.run({{"volume", service.upload(file_).at("id")},
@@ -198,7 +200,7 @@ class Proof {
     if (!daemon_.running()) {
       const int code = daemon_.wait();
       if (code != 1) find("the daemon ended with " + std::to_string(code) + "\n" + daemon_.log());
-      ++orderly_ends_;
+      ++tally_.orderly_ends;
       daemon_.start();
     }
     try {
@@ -233,7 +235,7 @@ class Proof {
 
   /// Rows and files agree after the last start has swept what faults left behind.
   void finish() {
-    fault_ = "the end";
+    name_ += ", the end";
     if (daemon_.terminate() != 0) find("exit code");
     daemon_.start();
     const ServiceClient service(daemon_);
@@ -246,22 +248,32 @@ class Proof {
       find("the audit is not what was sealed");
   }
 
-  std::int64_t stride_;
+  Fault fault_;
+  Moment moment_;
+  std::string name_;
+  Tally& tally_;
   TemporaryDirectory directory_;
   Faults faults_;
   Daemon daemon_;
   Bytes file_;
   std::set<std::string> volumes_, jobs_;  ///< acknowledged, not deleted
   std::vector<std::string> deleted_;      ///< acknowledged to be
-  std::string fault_;
-  std::int64_t number_ = 0, injected_ = 0, orderly_ends_ = 0, refusals_ = 0;
-  double slowest_ = 0, slowest_recovery_ = 0;
-  std::size_t findings_ = 0;
+  std::int64_t number_ = 0;
 };
 
 }  // namespace
 
 int main(int argc, char** argv) {
   if (argc < 2) return 2;
-  return Proof(argv[1], argc > 2 ? std::stoll(argv[2]) : 1).run() ? 0 : 1;
+  const std::int64_t stride = argc > 2 ? std::stoll(argv[2]) : 1;
+  Tally tally;
+  for (const Fault& fault : kFaults)
+    for (const Moment moment : {Moment::kRequests, Moment::kStart})
+      Sweep(argv[1], fault, moment, tally).run(stride);
+  std::printf(
+      "%lld faults, %lld orderly ends, %lld refusals, slowest call %.2f s, slowest recovery %.2f s, %zu "
+      "findings\n",
+      static_cast<long long>(tally.injected), static_cast<long long>(tally.orderly_ends),
+      static_cast<long long>(tally.refusals), tally.slowest, tally.slowest_recovery, tally.findings);
+  return tally.findings == 0 ? 0 : 1;
 }

@@ -515,6 +515,8 @@ TEST_F(JobServiceTest, WhatDoesNotFitIntoTheDatabaseIsAFullDisk) {
       EXPECT_GT(problem.members.at("free_bytes"), 0);
     }
   }
+  EXPECT_TRUE(service_->full_disk(std::system_error(EDQUOT, std::generic_category())));
+  EXPECT_FALSE(service_->full_disk(std::system_error(EIO, std::generic_category())));
   EXPECT_FALSE(service_->full_disk(std::runtime_error("no")));
   EXPECT_TRUE(names_in(settings().data_dir / "volumes").empty());
   EXPECT_TRUE(upload(*service_, "x"));

@@ -116,7 +116,10 @@ void write_much(Database& database) {
 
 /// A full disk in the middle of a step undoes the steps before it as well, and those after it have no
 /// transaction left to be in.
-TEST(StoreDatabaseTest, WhatAFullDiskUndoesIsEverybodys) {
+class FullDiskOfStore : public testing::TestWithParam<int> {};
+INSTANTIATE_TEST_SUITE_P(Errors, FullDiskOfStore, testing::Values(ENOSPC, EDQUOT));
+
+TEST_P(FullDiskOfStore, UndoesWhatIsEverybodys) {
   const ScratchFolder scratch;
   StoreDatabase store(scratch.path() / "volsmooth.db");
   std::atomic<int> failed = 0;
@@ -137,7 +140,7 @@ TEST(StoreDatabaseTest, WhatAFullDiskUndoesIsEverybodys) {
   };
   {
     const DiskCalls disk(scratch.path(), [](const std::string& call) {
-      return call == "write volsmooth.db-wal" ? ENOSPC : 0;
+      return call == "write volsmooth.db-wal" ? GetParam() : 0;
     });
     EXPECT_THROW(store.write([&](Database&) {
       step("before", false);
