@@ -12,6 +12,7 @@
 #include <filesystem>
 #include <functional>
 #include <iostream>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 
@@ -25,6 +26,7 @@
 #include "service/http/server.h"
 #include "service/jobs/job_service.h"
 #include "service/jobs/machine.h"
+#include "service/jobs/refusal_rows.h"
 #include "service/jobs/tokens.h"
 #include "service/pacs/dimse_listener.h"
 #include "service/pacs/pacs.h"
@@ -42,6 +44,7 @@ struct Options {
   JobServiceSettings jobs;
   std::filesystem::path ingest_program;
   std::string dimse_listen;
+  DimseTls dimse_tls;
   std::string log_level = "info";
   bool ephemeral = false;
   bool print_configuration = false;
@@ -62,10 +65,25 @@ void declare(CLI::App& app, Options& options) {
   app.add_option("--listen", options.server.listen, "ADDRESS:PORT (port 0: any free one) or unix:PATH")
       ->envname("VOLSMOOTH_LISTEN")
       ->capture_default_str();
-  app.add_option(
-         "--dimse-listen", options.dimse_listen,
-         "ADDRESS:PORT where devices send to the presets by C-STORE (port 0: any free one); default: nowhere")
-      ->envname("VOLSMOOTH_DIMSE_LISTEN");
+  auto* const dimse_listen = app.add_option("--dimse-listen", options.dimse_listen,
+                                            "ADDRESS:PORT where devices send to the presets by C-STORE (port "
+                                            "0: any free one); default: nowhere")
+                                 ->envname("VOLSMOOTH_DIMSE_LISTEN");
+  auto* const dimse_cert =
+      app.add_option(
+             "--dimse-tls-cert", options.dimse_tls.cert_file,
+             "Certificate chain (PEM) to take devices by TLS alone, each with a certificate of its own; "
+             "read for every association, as are the other two")
+          ->envname("VOLSMOOTH_DIMSE_TLS_CERT");
+  auto* const dimse_key =
+      app.add_option("--dimse-tls-key", options.dimse_tls.key_file, "Its private key (PEM)")
+          ->envname("VOLSMOOTH_DIMSE_TLS_KEY");
+  auto* const dimse_ca = app.add_option("--dimse-tls-ca", options.dimse_tls.ca_file,
+                                        "Certificates (PEM) that vouch for those of the devices")
+                             ->envname("VOLSMOOTH_DIMSE_TLS_CA");
+  dimse_cert->needs(dimse_key, dimse_ca, dimse_listen);
+  dimse_key->needs(dimse_cert);
+  dimse_ca->needs(dimse_cert);
   app.add_option("--data", options.jobs.data_dir,
                  "Folder of the volumes, jobs and results; made when missing")
       ->envname("VOLSMOOTH_DATA")
@@ -197,6 +215,20 @@ void reload_tls(Server& server) {
   }
 }
 
+/// Counts and audits devices that may not call; of the rows a part, like those of unknown callers by HTTP.
+std::function<void(const std::string&)> turned_away_devices(JobService& jobs, Metrics& metrics) {
+  return [&jobs, &metrics, rows = std::make_shared<RefusalRows>()](const std::string& preset) {
+    metrics.association_refused();
+    const auto others = rows->admit();
+    if (!others) return;
+    try {
+      jobs.audit_done({"association refused", preset, "caller-not-allowed" + *others});
+    } catch (const std::exception& error) {  // the refusal stands
+      log_error("dimse-fault", error.what());
+    }
+  };
+}
+
 /// Devices speak DIMSE with it; what comes is kept by the jobs.
 void listen_for_devices(const Options& options, JobService& jobs, Metrics& metrics,
                         std::optional<DimseListener>& listener) {
@@ -209,11 +241,13 @@ void listen_for_devices(const Options& options, JobService& jobs, Metrics& metri
     return jobs.receive(device, name, std::move(file));
   };
   inbox.max_bytes = options.jobs.max_upload_bytes;
-  listener.emplace(DimseListener::Settings{options.dimse_listen, options.allow_open_dimse,
+  const auto tls = options.dimse_tls.cert_file.empty() ? std::nullopt : std::optional(options.dimse_tls);
+  listener.emplace(DimseListener::Settings{options.dimse_listen, options.allow_open_dimse, tls,
                                            presets_by_title(options.presets), log_event, log_warning,
-                                           log_error, [&metrics] { metrics.association_refused(); }},
+                                           log_error, turned_away_devices(jobs, metrics)},
                    std::move(inbox));
-  log_event("dimse-ready", "listening for DICOM associations on " + listener->address());
+  log_event("dimse-ready", std::string("listening for DICOM associations ") + (tls ? "by TLS " : "") + "on " +
+                               listener->address());
 }
 
 /// Some file systems, such as folders shared into a virtual machine, have no sockets; serving goes on

@@ -7,5 +7,6 @@ namespace volsmooth {
 
 void send_instances();     ///< C-STORE to a peer
 void receive_instances();  ///< one association of a peer that sends by C-STORE
+void check_tls();          ///< whether its files can be used
 
 }  // namespace volsmooth

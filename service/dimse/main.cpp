@@ -7,10 +7,13 @@
 #include <dcmtk/dcmnet/dul.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdlib>
+#include <ctime>
 #include <exception>
 #include <string_view>
 #include <system_error>
+#include <utility>
 
 #include "service/dimse/channel.h"
 #include "service/dimse/commands.h"
@@ -20,10 +23,11 @@ namespace {
 
 constexpr int kUsageError = 2, kGivenUp = 1, kInternal = 70;
 
-/// All that DCMTK wants of the environment and of files.
+/// All that DCMTK and OpenSSL want of the environment and of files.
 void prepare() {
   OFLog::configure(OFLogger::OFF_LOG_LEVEL);
   ::setenv("TCP_NODELAY", "1", 1);  // for DCMTK: without it, each of many small answers waits 40 ms
+  ::tzset();
   dcmDisableGethostbyaddr.set(OFTrue);
   volsmooth::use_command_dictionary();
 }
@@ -40,10 +44,15 @@ void tell_our_fault() {
 
 int main(int argc, char** argv) {
   const std::string_view command = argc == 2 ? argv[1] : "";
-  if (command != "send" && command != "receive") return kUsageError;
+  constexpr std::pair<std::string_view, void (*)()> kCommands[] = {{"send", volsmooth::send_instances},
+                                                                   {"receive", volsmooth::receive_instances},
+                                                                   {"check-tls", volsmooth::check_tls}};
+  const auto* const found =
+      std::ranges::find(kCommands, command, &std::pair<std::string_view, void (*)()>::first);
+  if (found == std::end(kCommands)) return kUsageError;
   try {
     prepare();
-    command == "send" ? volsmooth::send_instances() : volsmooth::receive_instances();
+    found->second();
   } catch (const std::system_error&) {  // the sandbox's
     tell_our_fault();
     ::_exit(kInternal);

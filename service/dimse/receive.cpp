@@ -3,6 +3,7 @@
 #include <dcmtk/dcmdata/dctk.h>
 
 #include <algorithm>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -11,6 +12,7 @@
 #include "service/dimse/commands.h"
 #include "service/dimse/part10.h"
 #include "service/dimse/sandbox.h"
+#include "service/dimse/tls.h"
 
 namespace volsmooth {
 namespace {
@@ -71,7 +73,11 @@ class ChannelStream : public DcmOutputStream {
 /// One association, from the request on.
 class Receiving {
  public:
-  explicit Receiving(Channel& channel) : channel_(channel), network_(NET_ACCEPTOR) {}
+  /// `tls`: null when the peer speaks without.
+  Receiving(Channel& channel, DcmTLSTransportLayer* tls)
+      : channel_(channel), is_secure_(tls != nullptr), network_(NET_ACCEPTOR) {
+    if (is_secure_) ASC_setTransportLayer(network_.get(), tls, false);
+  }
 
   void run() {
     if (!accept()) return;
@@ -87,6 +93,7 @@ class Receiving {
   void store(const T_DIMSE_C_StoreRQ& request, T_ASC_PresentationContextID context);
 
   Channel& channel_;
+  const bool is_secure_;
   const Network network_;
   Association association_;
 };
@@ -94,7 +101,8 @@ class Receiving {
 bool Receiving::accept() {
   const OFCondition received =
       ASC_receiveAssociation(network_.get(), association_.into(), ASC_MAXIMUMPDUSIZE, nullptr, nullptr,
-                             OFFalse, DUL_NOBLOCK, kAssociationSeconds);
+                             is_secure_, DUL_NOBLOCK, kAssociationSeconds);
+  if (is_of_tls(received)) channel_.send({{"failure", "tls"}});
   if (received.bad()) return false;
   association_.opened();
   if (const std::uint32_t reason = verdict_of_daemon(); reason != 0) {
@@ -207,9 +215,16 @@ void Receiving::store(const T_DIMSE_C_StoreRQ& request, T_ASC_PresentationContex
 
 void receive_instances() {
   Channel channel(kChannelDescriptor);
+  const json wanted = channel.receive_document(kDaemonPatience);
+  std::optional<DcmTLSTransportLayer> tls;
+  try {
+    if (wanted.contains("tls")) set_up_tls(tls.emplace(NET_ACCEPTOR, nullptr, OFTrue), wanted["tls"]);
+  } catch (const TlsFault&) {
+    return channel.send({{"failure", "tls-files"}});
+  }
   dcmExternalSocketHandle.set(kConnectionDescriptor);  // so that DCMTK listens nowhere itself
   enter_sandbox(kReceivingBytes);
-  Receiving(channel).run();
+  Receiving(channel, tls ? &*tls : nullptr).run();
 }
 
 }  // namespace volsmooth

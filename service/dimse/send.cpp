@@ -4,12 +4,14 @@
 #include <dcmtk/dcmnet/dcmlayer.h>
 
 #include <array>
+#include <memory>
 #include <string>
 
 #include "service/dimse/association.h"
 #include "service/dimse/channel.h"
 #include "service/dimse/commands.h"
 #include "service/dimse/sandbox.h"
+#include "service/dimse/tls.h"
 
 namespace volsmooth {
 namespace {
@@ -22,13 +24,22 @@ constexpr std::chrono::minutes kPatience{60};  // the daemon ends us when it doe
 constexpr std::int64_t kSendingBytes = std::int64_t{10} << 30;
 
 /// Shuts the sandbox as soon as the connection stands, before a byte of the peer's is looked at.
-class SandboxedLayer : public DcmTransportLayer {
+template <class Layer>
+class Sandboxed : public Layer {
  public:
+  using Layer::Layer;
   DcmTransportConnection* createConnection(DcmNativeSocketType socket, OFBool is_secure) override {
     enter_sandbox(kSendingBytes);
-    return DcmTransportLayer::createConnection(socket, is_secure);
+    return Layer::createConnection(socket, is_secure);
   }
 };
+
+std::unique_ptr<DcmTransportLayer> layer_for(const json& wanted) {
+  if (!wanted.contains("tls")) return std::make_unique<Sandboxed<DcmTransportLayer>>();
+  auto layer = std::make_unique<Sandboxed<DcmTLSTransportLayer>>(NET_REQUESTOR, nullptr, OFTrue);
+  set_up_tls(*layer, wanted["tls"]);
+  return layer;
+}
 
 /// In the syntax of the files, or in the one that every archive knows.
 void propose(T_ASC_Parameters* parameters, const json& sop_classes) {
@@ -63,6 +74,7 @@ json request(const Network& network, const json& wanted, Association& associatio
   ASC_setAPTitles(parameters, wanted.at("calling").get<std::string>().c_str(),
                   wanted.at("called").get<std::string>().c_str(), nullptr);
   ASC_setPresentationAddresses(parameters, "localhost", address.c_str());
+  ASC_setTransportLayerType(parameters, wanted.contains("tls"));
   propose(parameters, wanted.at("sop_classes"));
   const OFCondition result = ASC_requestAssociation(network.get(), parameters, association.into(), nullptr,
                                                     nullptr, DUL_NOBLOCK, kAssociationSeconds);
@@ -71,7 +83,7 @@ json request(const Network& network, const json& wanted, Association& associatio
     return json::object();
   }
   if (result == DUL_ASSOCIATIONREJECTED) return rejection_of(association.get());
-  return {{"failure", "unreachable"}};
+  return {{"failure", is_of_tls(result) ? "tls" : "unreachable"}};
 }
 
 /// Whether a Part 10 file is one.
@@ -119,11 +131,17 @@ bool is_of_an_instance(const json& failure) {
 void send_instances() {
   Channel channel(kChannelDescriptor);
   dcmConnectionTimeout.set(kConnectSeconds);
-  SandboxedLayer layer;
+  const json wanted = channel.receive_document(kPatience);
+  std::unique_ptr<DcmTransportLayer> layer;
+  try {
+    layer = layer_for(wanted);
+  } catch (const TlsFault&) {
+    return channel.send({{"failure", "tls-files"}});
+  }
   const Network network(NET_REQUESTOR);
-  ASC_setTransportLayer(network.get(), &layer, false);
+  ASC_setTransportLayer(network.get(), layer.get(), false);
   Association association;
-  json said = request(network, channel.receive_document(kPatience), association);
+  json said = request(network, wanted, association);
   channel.send(said);
   std::string bytes;
   while (!said.contains("failure") || is_of_an_instance(said["failure"])) {

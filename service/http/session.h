@@ -11,7 +11,7 @@
 #include "service/http/handshake_limit.h"
 #include "service/http/host_check.h"
 #include "service/http/log.h"
-#include "service/http/refusal_rows.h"
+#include "service/jobs/refusal_rows.h"
 #include "service/http/routes.h"
 #include "service/http/server.h"
 #include "service/http/thread_pool.h"

@@ -105,9 +105,9 @@ Session::Awaitable<Reply> Session::audited(Exchange& exchange, Reply reply) {
   if (!entry) co_return reply;
   const bool is_known = !exchange.request.caller.token.empty();
   if (!is_known && (entry->outcome == "unauthenticated" || entry->outcome == "cross-origin")) {
-    const auto left_out = context_.unknown_callers.admit();
-    if (!left_out) co_return reply;
-    if (*left_out > 0) entry->outcome += ", and " + std::to_string(*left_out) + " before it without a row";
+    const auto others = context_.unknown_callers.admit();
+    if (!others) co_return reply;
+    entry->outcome += *others;
   }
   const auto recorded =
       co_await run_guarded(context_.auditing, exchange, [&]() -> tl::expected<void, Problem> {

@@ -47,6 +47,13 @@ NodeFailure failure_from(const Node& node, const nlohmann::json& told) {
              "volsmooth-dimse cannot do its work; the fault is the service's.",
              {{"node", node.name}}},
             false};
+  if (what == "tls")
+    return failure(
+        node, true,
+        "and this service did not agree on TLS: its certificate is not that of its name, or nobody "
+        "vouches for it, or it wants one of ours");
+  if (what == "tls-files")
+    return failure(node, true, "was not called: the files that its 'tls' names cannot be used");
   if (what != "rejected") return connection_lost(node);
   return failure(node, told.value("result", 0) != kPermanently,
                  std::string("rejected the association: ") +

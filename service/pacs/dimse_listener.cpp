@@ -39,6 +39,11 @@ std::string title_in(const json& request, const char* member) {
   return title;
 }
 
+/// "--dimse-tls-ca" of "ca_file".
+std::string option_of(const std::string& member) {
+  return "--dimse-tls-" + member.substr(0, member.find('_'));
+}
+
 /// What is no AE title stays out of the log.
 std::string logged(const std::string& title) {
   return is_ae_title(title) ? title : "?";
@@ -76,11 +81,16 @@ std::map<std::string, CalledPreset> presets_by_title(const std::vector<Preset>& 
 DimseListener::DimseListener(Settings settings, Inbox inbox)
     : settings_(std::move(settings)),
       inbox_(std::move(inbox)),
-      listening_(listen_for_dimse(settings_.listen, settings_.allow_open_network)),
+      listening_(
+          listen_for_dimse(settings_.listen, settings_.allow_open_network || settings_.tls.has_value())),
       verifying_(kVerifying) {
   if (settings_.presets.empty())
     throw std::runtime_error("--dimse-listen needs presets in the configuration: their AE titles are called");
   dimse_program();
+  if (settings_.tls)
+    check(*settings_.tls, [](const std::string& member, const std::string& why) {
+      throw std::runtime_error(option_of(member) + " cannot be used: " + why);
+    });
   accepting_ = std::jthread([this](const std::stop_token& stopped) { accept_all(stopped); });
 }
 
@@ -112,18 +122,17 @@ void DimseListener::accept_all(const std::stop_token& stopped) {
   }
 }
 
-/// Counts one who may not call, and says so.
-std::string DimseListener::told_of_stranger(const std::string& who) const {
-  settings_.on_stranger();
-  return "rejected: " + who + " may not call";
+void DimseListener::log_fruitless(const Settings::Log& log, const std::string& line) {
+  if (const auto others = fruitless_.admit()) log("dimse-association", line + *others);
 }
 
 /// Who comes from where no preset expects anybody gets neither a process nor one of the places.
 void DimseListener::begin(FileDescriptor connection, const boost::asio::ip::address_v4& address) {
   const auto expects = [&](const auto& preset) { return preset.second.callers.may_come_from(address); };
   if (std::ranges::none_of(settings_.presets, expects)) {
-    settings_.log_warning("dimse-association", told_of_stranger(address.to_string()));
     turned_away_.add(std::move(connection), {kStranger, sizeof kStranger});
+    log_fruitless(settings_.log_warning, "rejected: " + address.to_string() + " may not call");
+    settings_.on_stranger("");
     return;
   }
   if (served_.size() >= kAssociations) {
@@ -155,15 +164,26 @@ void DimseListener::serve(Served& served) {
   }
   const auto& log =
       broken_off || tally.is_stranger || tally.refused > 0 ? settings_.log_warning : settings_.log;
-  log("dimse-association", "from " + tally.calling + " to " + tally.called + ": " +
-                               std::to_string(tally.stored) + " stored, " + std::to_string(tally.refused) +
-                               " refused, " + end);
+  const std::string line = "from " + tally.calling + " to " + tally.called + ": " +
+                           std::to_string(tally.stored) + " stored, " + std::to_string(tally.refused) +
+                           " refused, " + end;
+  if (tally.stored > 0) {
+    log("dimse-association", line);
+  } else {
+    log_fruitless(log, line);
+  }
 }
 
 /// How it ended.
 std::string DimseListener::talk(Served& served, Tally& tally) {
   Channel channel = served.child.channel();
+  channel.send(settings_.tls ? json{{"tls", document_of(*settings_.tls)}} : json::object());
   const json request = channel.receive_document(kRequestPatience);
+  if (request.value("failure", "") == "tls") {
+    tally.is_stranger = true;
+    settings_.on_stranger("");
+    return "rejected: " + served.address.to_string() + " does not speak TLS, or nobody vouches for it";
+  }
   if (request.contains("failure")) return "broken off by a fault of the service's";
   const std::string calling = title_in(request, "calling"), called = title_in(request, "called");
   tally.calling = logged(calling);
@@ -180,9 +200,9 @@ std::string DimseListener::talk(Served& served, Tally& tally) {
   if (const Callers& callers = preset->second.callers;
       !callers.may_be(calling) || !callers.may_come_from(served.address)) {
     tally.is_stranger = true;
-    const std::string told = told_of_stranger(tally.calling + " at " + served.address.to_string());
+    settings_.on_stranger(preset->second.name);
     reject(kNoSuchCaller);
-    return told;
+    return "rejected: " + tally.calling + " at " + served.address.to_string() + " may not call";
   }
   channel.send({{"reject", kAccepted}});
   Arrivals arrivals(inbox_);

@@ -4,13 +4,16 @@
 #include <list>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <semaphore>
 #include <string>
 #include <thread>
 
 #include "service/jobs/pacs.h"
+#include "service/jobs/refusal_rows.h"
 #include "service/pacs/arrivals.h"
 #include "service/pacs/callers.h"
+#include "service/pacs/dimse_tls.h"
 #include "service/pacs/listening_socket.h"
 #include "service/pacs/turned_away.h"
 
@@ -33,10 +36,12 @@ class DimseListener {
   struct Settings {
     std::string listen;  ///< ADDRESS:PORT
     bool allow_open_network = false;
+    std::optional<DimseTls> tls = {};             ///< with it, by TLS alone, from peers with a certificate
     std::map<std::string, CalledPreset> presets;  ///< by AE title
     using Log = std::function<void(std::string_view event, const std::string& message)>;
     Log log, log_warning, log_error;
-    std::function<void()> on_stranger;  ///< one who may not call was turned away
+    /// One who may not call was turned away, by that preset or, empty, by all. From any thread.
+    std::function<void(const std::string& preset)> on_stranger;
   };
 
   /// Listens at once. Throws std::runtime_error with a sentence that says what to change.
@@ -55,7 +60,8 @@ class DimseListener {
   std::string talk(Served& served, Tally& tally);
   std::uint16_t keep(Arrivals& arrivals, const std::string& preset, const nlohmann::json& announced);
 
-  std::string told_of_stranger(const std::string& who) const;
+  /// Of associations that brought nothing, which anybody can cause, a part is logged.
+  void log_fruitless(const Settings::Log& log, const std::string& line);
 
   const Settings settings_;
   const Inbox inbox_;
@@ -63,6 +69,7 @@ class DimseListener {
   std::counting_semaphore<> verifying_;
   std::list<Served> served_;  // the accepting thread's, until that has ended
   TurnedAway turned_away_;    // its as well
+  RefusalRows fruitless_;
   std::jthread accepting_;
 };
 

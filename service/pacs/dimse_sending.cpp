@@ -25,11 +25,13 @@ constexpr std::size_t kSlowestBytesPerSecond = std::size_t{64} << 10;
 json association_for(const DimsePeer& peer, std::span<const DicomInstance> instances) {
   std::set<std::string> sop_classes;
   for (const DicomInstance& instance : instances) sop_classes.insert(instance.sop_class_uid);
-  return {{"host", peer.host},
-          {"port", peer.port},
-          {"called", peer.called},
-          {"calling", peer.calling},
-          {"sop_classes", sop_classes}};
+  json association{{"host", peer.host},
+                   {"port", peer.port},
+                   {"called", peer.called},
+                   {"calling", peer.calling},
+                   {"sop_classes", sop_classes}};
+  if (peer.tls) association["tls"] = document_of(*peer.tls);
+  return association;
 }
 
 /// Asks ten times a second whether to go on, and kills the child when not: whoever waits for it, in whatever

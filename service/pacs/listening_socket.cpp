@@ -57,7 +57,9 @@ ListeningSocket listen_for_dimse(const std::string& listen, bool allow_open_netw
   if (!is_loopback(endpoint) && !allow_open_network)
     fail("refusing to listen for DIMSE on " + text_of(endpoint) +
          ": DIMSE authenticates nobody, so everyone who reaches that address could have jobs run. Listen on "
-         "127.0.0.1, or add --allow-open-dimse when the presets' 'from', or something in front of it, does "
+         "127.0.0.1, use TLS with certificates for all devices (--dimse-tls-cert, --dimse-tls-key and "
+         "--dimse-tls-ca), or add --allow-open-dimse when the presets' 'from', or something in front of it, "
+         "does "
          "the checking.");
   FileDescriptor socket(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   const int yes = 1;

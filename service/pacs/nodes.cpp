@@ -67,9 +67,24 @@ std::string ae_title_in(const json& peer, const std::string& name, const char* m
   return title;
 }
 
+/// The peer has to prove that it is who the configuration says; there is no way around that.
+DimseTls tls_in(const json& peer, const std::string& node, const std::string& host) {
+  const json& configured = peer["tls"];
+  if (!configured.is_object()) refuse_node(node, "'tls' must be an object with 'ca_file'");
+  know(configured, node, {"ca_file", "cert_file", "key_file", "server_name"});
+  const auto text = [&](const char* member) { return text_in(configured, node, member); };
+  DimseTls tls{text("ca_file"), text("cert_file"), text("key_file"), text("server_name")};
+  if (tls.ca_file.empty())
+    refuse_node(node, "'tls' needs 'ca_file', the certificates (PEM) that vouch for the peer's");
+  if (tls.cert_file.empty() != tls.key_file.empty())
+    refuse_node(node, "'tls' has both 'cert_file' and 'key_file', or neither");
+  if (tls.server_name.empty()) tls.server_name = host;
+  return tls;
+}
+
 DimsePeer peer_from(const std::string& name, const json& configured) {
   if (!configured.is_object()) refuse_node(name, "'dimse' must be an object with 'host', 'port' and 'aet'");
-  know(configured, name, {"host", "port", "aet", "calling_aet"});
+  know(configured, name, {"host", "port", "aet", "calling_aet", "tls"});
   DimsePeer peer{text_in(configured, name, "host"), 0, ae_title_in(configured, name, "aet"), kOurAeTitle};
   const auto of_host = [](char c) {
     return std::isalnum(static_cast<unsigned char>(c)) || c == '-' || c == '.';
@@ -84,6 +99,7 @@ DimsePeer peer_from(const std::string& name, const json& configured) {
     refuse_node(name, "'host', a colon and 'port' must be " + std::to_string(kLongestAddress) +
                           " characters at most; give a shorter name of the host, or its address");
   if (configured.contains("calling_aet")) peer.calling = ae_title_in(configured, name, "calling_aet");
+  if (configured.contains("tls")) peer.tls = tls_in(configured, name, peer.host);
   return peer;
 }
 

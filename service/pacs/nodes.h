@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "service/pacs/dimse_tls.h"
+
 namespace volsmooth {
 
 /// An application entity that takes instances by C-STORE.
@@ -13,6 +15,7 @@ struct DimsePeer {
   int port = 0;
   std::string called;   ///< its AE title
   std::string calling;  ///< ours
+  std::optional<DimseTls> tls = {};
 };
 
 /// A DICOMweb server that jobs may fetch series from and send results to, or a peer that these can be sent
@@ -27,10 +30,10 @@ struct Node {
 };
 
 /// Reads the member "nodes" of the configuration: `{name: {"dicomweb": url, "credentials_file": path}}` or
-/// `{name: {"dimse": {"host": name, "port": number, "aet": title, "calling_aet": title}}}`. The file of
-/// credentials holds one line, `user:password` (Basic) or a token (Bearer), and only its owner may read it.
-/// Both may have `"tenants": [name]`.
-/// Throws std::runtime_error with what is wrong and where.
+/// `{name: {"dimse": {"host": name, "port": number, "aet": title, "calling_aet": title, "tls": {"ca_file":
+/// path, "cert_file": path, "key_file": path, "server_name": name}}}}`. The file of credentials holds one
+/// line, `user:password` (Basic) or a token (Bearer), and only its owner may read it. Both may have
+/// `"tenants": [name]`. Throws std::runtime_error with what is wrong and where.
 std::vector<Node> nodes_from(const nlohmann::json& configured);
 
 }  // namespace volsmooth

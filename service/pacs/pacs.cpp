@@ -25,6 +25,12 @@ NodeFailure gone(const std::string& node) {
 
 Pacs make_pacs(std::vector<Node> nodes, std::vector<Preset> presets, std::int64_t max_bytes) {
   if (std::ranges::any_of(nodes, [](const Node& node) { return node.dimse.has_value(); })) dimse_program();
+  for (const Node& node : nodes)
+    if (node.dimse && node.dimse->tls)
+      check(*node.dimse->tls, [&](const std::string& member, const std::string& why) {
+        throw std::runtime_error("configuration, node '" + node.name + "': '" + member +
+                                 "' cannot be used: " + why);
+      });
   Pacs pacs;
   pacs.presets = std::move(presets);
   for (const Node& node : nodes) pacs.nodes.push_back({node.name, !node.dimse, node.tenants});

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "tests/support/raw_association.h"
+#include "tests/support/test_certificate.h"
 #include "tests/system/orthanc.h"
 
 namespace volsmooth::test {
@@ -59,7 +60,7 @@ class Dimse : public testing::Test {
     series_ = first(archive_->query("/studies/" + study_ + "/series")[0], "0020000E");
   }
 
-  json configuration() const {
+  virtual json configuration() const {
     const auto dimse = [&](const std::string& aet) {
       return json{{"dimse", {{"host", "127.0.0.1"}, {"port", archive_->dimse_port()}, {"aet", aet}}}};
     };
@@ -78,8 +79,9 @@ class Dimse : public testing::Test {
 
   /// What storescu ends with.
   int store(int port, const std::string& called, const std::vector<std::string>& files,
-            const std::string& option = "-v") const {
-    std::vector<std::string> command{kStoreUser, option, "-aec", called, "127.0.0.1", std::to_string(port)};
+            std::vector<std::string> command = {"-v"}) const {
+    command.insert(command.begin(), kStoreUser);
+    command.insert(command.end(), {"-aec", called, "127.0.0.1", std::to_string(port)});
     command.insert(command.end(), files.begin(), files.end());
     return ChildProcess(command, folder_ / "storescu", folder_ / "storescu").wait();
   }
@@ -144,6 +146,12 @@ class Dimse : public testing::Test {
       return false;
     });
     return found;
+  }
+
+  std::string audit() const {
+    const auto file = folder_ / "audit";
+    EXPECT_EQ(ChildProcess({VOLSMOOTHD, "audit", "export", "--data", daemon_->data()}, file, file).wait(), 0);
+    return content_of(file);
   }
 
   static bool is_delivered(const json& delivery) { return delivery.at("state") == "delivered"; }
@@ -248,7 +256,7 @@ TEST_F(Dimse, RunsThePresetThatADeviceCalls) {
 }
 
 TEST_F(Dimse, ADeathOfTheDaemonLosesNothingThatWasAcknowledged) {
-  ASSERT_EQ(store(port_, "HEAD", files_, "-xi"), 0);
+  ASSERT_EQ(store(port_, "HEAD", files_, {"-xi"}), 0);
   daemon_->kill();
   daemon_->start();
   EXPECT_EQ(delivery_of_preset().at("stored"), datasets_.size());
@@ -273,6 +281,10 @@ TEST_F(Dimse, RejectsACallerWhomThePresetDoesNotName) {
   }
   EXPECT_THAT(client().call("GET", "/metrics").body,
               testing::HasSubstr("volsmooth_refused_associations_total 2"));
+  const std::string rows = audit();
+  for (const char* preset : {"ct", "mr"})
+    EXPECT_THAT(rows, testing::ContainsRegex(std::string(R"("association refused".*"object":")") + preset +
+                                             R"(","outcome":"caller-not-allowed")"));
 }
 
 TEST_F(Dimse, RefusesAnInstanceThatItCannotUnderstand) {
@@ -367,6 +379,72 @@ TEST_F(Dimse, AStopEndsAssociations) {
   const auto begin = std::chrono::steady_clock::now();
   EXPECT_EQ(daemon_->terminate(), 0);
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(5));
+}
+
+/// The same, but devices call by TLS. So are called "scp", which is a name that its certificate has, and
+/// "impostor", at the same place, which is not.
+class DimseByTls : public Dimse {
+ protected:
+  json configuration() const override {
+    json changed = Dimse::configuration();
+    changed.update({{"dimse-tls-cert", us_.certificate},
+                    {"dimse-tls-key", us_.key},
+                    {"dimse-tls-ca", device_.certificate}});
+    json& scp = changed["nodes"]["scp"]["dimse"];
+    scp["tls"] = {{"ca_file", scp_.certificate}, {"cert_file", us_.certificate}, {"key_file", us_.key}};
+    changed["nodes"]["impostor"]["dimse"] = scp;
+    changed["nodes"]["impostor"]["dimse"]["tls"]["server_name"] = "pacs.example";
+    return changed;
+  }
+  std::vector<std::string> by_tls(const TestCertificate& device) const {
+    return {"-v", "+tls", device.key, device.certificate, "+cf", us_.certificate};
+  }
+
+  const TestCertificate us_ = TestCertificate::make(folder_.path(), "us"),
+                        device_ = TestCertificate::make(folder_.path(), "ct1"),
+                        scp_ = TestCertificate::make(folder_.path(), "localhost"),
+                        stranger_ = TestCertificate::make(folder_.path(), "stranger");
+};
+
+TEST_F(DimseByTls, DevicesNeedACertificateThatSomebodyVouchesFor) {
+  ASSERT_EQ(store(port_, "HEAD", files_, by_tls(device_)), 0) << content_of(folder_ / "storescu");
+  EXPECT_EQ(delivery_of_preset().at("stored"), datasets_.size());
+  const std::vector<std::vector<std::string>> strangers{
+      {"-v"}, {"-v", "+tla", "+cf", us_.certificate}, by_tls(stranger_)};
+  for (const auto& options : strangers) {
+    EXPECT_NE(store(port_, "HEAD", {files_.front()}, options), 0) << content_of(folder_ / "storescu");
+  }
+  EXPECT_TRUE(eventually([&] {
+    return client().call("GET", "/metrics").body.find("volsmooth_refused_associations_total 3\n") !=
+           std::string::npos;
+  }));
+  EXPECT_THAT(daemon_->log(), testing::HasSubstr("from STORESCU to HEAD: 12 stored, 0 refused, released"));
+  EXPECT_THAT(daemon_->log(),
+              testing::HasSubstr("rejected: 127.0.0.1 does not speak TLS, or nobody vouches"));
+}
+
+/// Who is silent in the middle of the handshake holds up nobody else.
+TEST_F(DimseByTls, WhatAPeerDoesEndsItsAssociationAlone) {
+  const RawPeer silent(port_);
+  silent.say(std::string("\x16\3\1\1\x1f", 5));  // the head of a ClientHello
+  const RawPeer other(port_);
+  other.say(std::string(100'000, '\x16'));
+  EXPECT_EQ(store(port_, "HEAD", files_, by_tls(device_)), 0) << content_of(folder_ / "storescu");
+}
+
+TEST_F(DimseByTls, SendsToAPeerThatProvesItsName) {
+  std::filesystem::create_directory(folder_ / "received");
+  const ChildProcess peer({"/usr/bin/storescp", "+tls", scp_.key, scp_.certificate, "+cf", us_.certificate,
+                           "-od", folder_ / "received", std::to_string(scp_port_)},
+                          folder_ / "scp", folder_ / "scp");
+  const std::string impostor = client().submit(order("archive", "impostor")),
+                    id = client().submit(order("archive", "scp"));
+  EXPECT_EQ(delivery(id, is_delivered).at("stored"), datasets_.size() + 1);
+  const json refused = delivery(impostor, [](const json& one) { return one.at("tries") > 0; });
+  EXPECT_EQ(refused.at("state"), "pending");
+  EXPECT_THAT(refused.at("error").at("detail"), testing::HasSubstr("did not agree on TLS"));
+  EXPECT_EQ(std::ranges::distance(std::filesystem::directory_iterator(folder_ / "received")),
+            std::ssize(datasets_) + 1);
 }
 
 }  // namespace

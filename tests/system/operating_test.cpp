@@ -100,6 +100,35 @@ TEST_F(OperatingTest, AVariableMayNameAFileThatHoldsTheValue) {
   EXPECT_THAT(missing.errors, HasSubstr("VOLSMOOTH_WORKERS_FILE"));
 }
 
+TEST_F(OperatingTest, WhatIsWrongWithTlsOfDimseStopsTheStart) {
+  const json presets{{"head", json::object()}};
+  const json listening{{"dimse-listen", "127.0.0.1:0"},
+                       {"dimse-tls-cert", "/nowhere"},
+                       {"dimse-tls-key", "/nowhere"},
+                       {"dimse-tls-ca", "/nowhere"},
+                       {"presets", presets}};
+  const auto without = [&](const char* member) {
+    json rest = listening;
+    rest.erase(member);
+    return rest;
+  };
+  const json peer{{"host", "pacs"}, {"port", 104}, {"aet", "PACS"}, {"tls", {{"ca_file", "/nowhere"}}}};
+  const std::vector<std::pair<json, std::string>> table{
+      {without("dimse-listen"), "--dimse-tls-cert requires --dimse-listen"},
+      {without("dimse-tls-key"), "--dimse-tls-cert requires --dimse-tls-key"},
+      {without("dimse-tls-ca"), "--dimse-tls-cert requires --dimse-tls-ca"},
+      {without("dimse-tls-cert"), "requires --dimse-tls-cert"},
+      {listening, "--dimse-tls-ca cannot be used: it cannot be read"},
+      {{{"nodes", {{"pacs", {{"dimse", peer}}}}}},
+       "node 'pacs': 'ca_file' cannot be used: it cannot be read"}};
+  for (const auto& [configured, expected] : table) {
+    const auto refused = run(
+        {"--listen", "127.0.0.1:0", "--data", folder_ / "data", "--config", file_with(configured.dump())});
+    EXPECT_NE(refused.exit_code, 0);
+    EXPECT_THAT(refused.errors, HasSubstr(expected));
+  }
+}
+
 TEST_F(OperatingTest, MetricsHaveTheTimeOfEveryStage) {
   Daemon daemon(VOLSMOOTHD);
   const ServiceClient service(daemon);

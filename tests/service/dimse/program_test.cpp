@@ -13,6 +13,8 @@
 #include "service/pacs/dimse_child.h"
 #include "tests/support/loopback.h"
 #include "tests/support/raw_association.h"
+#include "tests/support/scratch_folder.h"
+#include "tests/support/test_certificate.h"
 
 namespace volsmooth {
 namespace {
@@ -57,6 +59,7 @@ TEST(DimseProgram, AnEchoIsASignOfLife) {
   const FileDescriptor peer = place.connected();
   const DimseChild child("receive", place.accepted().get());
   Channel channel = child.channel();
+  channel.send(json::object());
   say(peer, association_request());
   EXPECT_EQ(channel.receive_document(kPatience), json({{"called", "HEAD"}, {"calling", "RAW"}}));
   channel.send({{"reject", 0}});
@@ -97,6 +100,48 @@ TEST(DimseProgram, AnAddressThatWouldBeCutOffIsNotConnectedTo) {
   EXPECT_EQ(channel.receive_document(kPatience), json({{"failure", "internal"}}));
 }
 
+TEST(DimseProgram, SaysWhichFileOfTlsCannotBeUsed) {
+  const ScratchFolder scratch;
+  const auto ours = TestCertificate::make(scratch.path(), "ours"),
+             other = TestCertificate::make(scratch.path(), "other"),
+             locked = TestCertificate::make(scratch.path(), "locked", "secret");
+  const json good{{"ca_file", other.certificate}, {"cert_file", ours.certificate}, {"key_file", ours.key}};
+  const auto but = [&](const json& changed) {
+    json tls = good;
+    tls.update(changed);
+    return tls;
+  };
+  const std::vector<std::pair<json, std::string>> table = {
+      {good, ""},
+      {{{"ca_file", other.certificate}}, ""},
+      {but({{"ca_file", scratch / "nowhere"}}), "ca_file"},
+      {but({{"ca_file", other.key}}), "ca_file"},
+      {but({{"cert_file", scratch / "nowhere"}}), "cert_file"},
+      {but({{"cert_file", ours.key}}), "cert_file"},
+      {but({{"key_file", scratch / "nowhere"}}), "key_file"},
+      {but({{"key_file", other.key}}), "key_file"},
+      {but({{"cert_file", locked.certificate}, {"key_file", locked.key}}), "key_file"}};
+  for (const auto& [tls, expected] : table) {
+    const DimseChild child("check-tls");
+    Channel channel = child.channel();
+    channel.send({{"tls", tls}});
+    EXPECT_EQ(channel.receive_document(kPatience).value("member", ""), expected) << tls;
+  }
+}
+
+/// They were good when the daemon started.
+TEST(DimseProgram, FilesOfTlsThatAreGoneAreTold) {
+  const Place place;
+  const FileDescriptor peer = place.connected();
+  const DimseChild receiving("receive", place.accepted().get()), sending("send");
+  json association = association_with("127.0.0.1", place.port());
+  association["tls"] = {{"ca_file", "/nowhere"}};
+  receiving.channel().send(association);
+  sending.channel().send(association);
+  for (const DimseChild* child : {&receiving, &sending})
+    EXPECT_EQ(child->channel().receive_document(kPatience), json({{"failure", "tls-files"}}));
+}
+
 /// In a process that may set no limits, so that the sandbox cannot be entered.
 json told_without_sandbox(const std::function<json()>& told) {
   int ends[2];
@@ -130,7 +175,9 @@ TEST(DimseProgram, AMissingSandboxIsToldAsAFaultOfOurs) {
   const FileDescriptor peer = place.connected();
   EXPECT_EQ(told_without_sandbox([&] {
               const DimseChild child("receive", place.accepted().get());
-              return child.channel().receive_document(kPatience);
+              Channel channel = child.channel();
+              channel.send(json::object());
+              return channel.receive_document(kPatience);
             }),
             json({{"failure", "internal"}}));
   const Place other;

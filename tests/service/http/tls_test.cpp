@@ -2,6 +2,7 @@
 
 #include "service/jobs/tokens.h"
 #include "tests/service/http/running_server.h"
+#include "tests/support/test_certificate.h"
 #include "tests/support/tls_client.h"
 
 namespace volsmooth {

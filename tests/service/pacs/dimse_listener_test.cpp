@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <mutex>
 
 #include "tests/support/loopback.h"
@@ -23,7 +24,10 @@ class DimseListening : public testing::Test {
     settings.log = [this](auto, const std::string& message) { log(message); };
     settings.log_warning = [this](auto, const std::string& message) { log("warning: " + message); };
     settings.log_error = settings.log_warning;
-    settings.on_stranger = [this] { ++strangers_; };
+    settings.on_stranger = [this](const std::string& at) {
+      ++strangers_;
+      turned_away_by_ = at;
+    };
     listener_.emplace(std::move(settings), inbox_);
   }
   static Preset preset(const std::string& aet, const std::vector<std::string>& callers,
@@ -51,6 +55,7 @@ class DimseListening : public testing::Test {
   }
 
   std::atomic<int> strangers_ = 0;
+  std::string turned_away_by_;  ///< the last one; read when the listener has ended
 
  private:
   void log(const std::string& message) {
@@ -92,6 +97,7 @@ TEST_F(DimseListening, OthersAreRejectedCountedAndLogged) {
                 testing::HasSubstr("warning: from RAW to HEAD: 0 stored, 0 refused, rejected: RAW at "
                                    "127.0.0.1 may not call"));
     EXPECT_EQ(strangers_, ++expected);
+    EXPECT_EQ(turned_away_by_, "HEAD");
   }
 }
 
@@ -101,12 +107,21 @@ TEST_F(DimseListening, WhoComesFromWhereNobodyIsExpectedGetsNoProcess) {
   EXPECT_EQ(answer(), kNotRecognised);
   EXPECT_EQ(strangers_, 1);
   EXPECT_EQ(logged(), "warning: rejected: 127.0.0.1 may not call\n");
+  EXPECT_EQ(turned_away_by_, "");
+}
+
+TEST_F(DimseListening, StrangersDoNotFillTheLog) {
+  listen({preset("HEAD", {}, {"10.0.0.0/8"})});
+  for (int k = 0; k < 70; ++k) EXPECT_EQ(answer(), kNotRecognised);
+  EXPECT_EQ(strangers_, 70);
+  EXPECT_EQ(std::ranges::count(logged(), '\n'), 60);
 }
 
 TEST_F(DimseListening, ATitleThatIsNoPresetsIsNoStrangersDoing) {
   listen({preset("FOOT", {"CT1"}, {})});
   EXPECT_EQ(answer(), std::string("\3\0\0\0\0\4\0\1\1\7", 10));
   EXPECT_EQ(strangers_, 0);
+  EXPECT_EQ(logged(), "from RAW to HEAD: 0 stored, 0 refused, rejected\n");
 }
 
 }  // namespace

@@ -58,6 +58,19 @@ TEST_F(Nodes, APeerIsAHostAPortAndAnAeTitle) {
   EXPECT_EQ(nodes_from(ours)[0].dimse->calling, "SMOOTHER");
 }
 
+TEST_F(Nodes, APeerByTlsHasToProveItsName) {
+  const auto tls_of = [](const json& tls) {
+    return document_of(*nodes_from(json{{"p", peer({{"tls", tls}})}})[0].dimse->tls);
+  };
+  EXPECT_EQ(tls_of({{"ca_file", "a"}}), json({{"ca_file", "a"}, {"name", "pacs"}}));
+  const json all{{"ca_file", "a"}, {"cert_file", "b"}, {"key_file", "c"}};
+  json expected = all;
+  expected["name"] = "pacs.example";
+  json configured = all;
+  configured["server_name"] = "pacs.example";
+  EXPECT_EQ(tls_of(configured), expected);
+}
+
 TEST_F(Nodes, AreEverybodysOrOfTenants) {
   const json two = {"ward-a", "ward-b"};
   const auto nodes = nodes_from(json{{"a", {{"dicomweb", "http://p"}}},
@@ -106,7 +119,13 @@ TEST_F(Nodes, WhatIsWrongIsRefusedWithItsPlace) {
       {{{"p", {{"dicomweb", "http://p"}, {"credentials_file", file_with("t", 0640)}}}}, "owner's alone"},
       {{{"p", {{"dicomweb", "http://p"}, {"dimse", json::object()}}}}, "has no other member"},
       {{{"p", {{"dimse", "pacs:104"}}}}, "'dimse' must be an object with"},
-      {{{"p", peer({{"tls", true}})}}, "'tls' is not known; known are host, port, aet, calling_aet"},
+      {{{"p", peer({{"ae", "X"}})}}, "'ae' is not known"},
+      {{{"p", peer({{"tls", true}})}}, "'tls' must be an object with 'ca_file'"},
+      {{{"p", peer({{"tls", json::object()}})}}, "'tls' needs 'ca_file'"},
+      {{{"p", peer({{"tls", {{"ca_file", 5}}}})}}, "'ca_file' must be text"},
+      {{{"p", peer({{"tls", {{"ca_file", "a"}, {"cert_file", "b"}}}})}}, "both 'cert_file' and 'key_file'"},
+      {{{"p", peer({{"tls", {{"ca_file", "a"}, {"key_file", "b"}}}})}}, "both 'cert_file' and 'key_file'"},
+      {{{"p", peer({{"tls", {{"ca_file", "a"}, {"verify", false}}}})}}, "'verify' is not known"},
       {{{"p", peer({{"host", ""}})}}, "'host' must be a name"},
       {{{"p", peer({{"host", "::1"}})}}, "'host' must be a name or an IPv4"},
       {{{"p", peer({{"host", "pacs/x"}})}}, "'host' must be a name"},
