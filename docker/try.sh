@@ -30,7 +30,7 @@ debootstrapped_base() {
   "${engine[@]}" image exists "$name" || {
     say "no registry in reach: making the base image from Debian's archive (a minute)"
     ((EUID == 0)) || die "debootstrap needs root: run this script with sudo"
-    need debootstrap
+    need debootstrap >&2
     debootstrap --variant=minbase bookworm "$root" >"$work/debootstrap.log" ||
       { tail -5 "$work/debootstrap.log" >&2; die "debootstrap failed; is deb.debian.org in reach?"; }
     # As this machine's apt reaches the archive (a proxy, say), so shall the one in the image.
