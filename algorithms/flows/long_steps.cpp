@@ -83,10 +83,12 @@ class Run {
     moved_known_ = true;
   }
 
-  /// No longer than what is left or what stages can stand for; and where little would be left, half of it.
+  /// No longer than asked for, than what is left, or than what stages can stand for; and where little would
+  /// be left, half of it.
   std::int64_t fitted(std::int64_t length) const {
     const std::int64_t left = steps_ - done_;
-    if (length < left && 5 * length > 3 * left) length = std::max((left + 1) / 2, kLeastLength);
+    const bool leaves_little = length < left && 5 * length > 3 * left;
+    if (leaves_little && length >= kLeastLength) length = std::max((left + 1) / 2, kLeastLength);
     return std::min({length, left, most_steps_.back()});
   }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <stdexcept>
 
 #include "algorithms/flows/mean_curvature_flow.h"
 #include "algorithms/volume/parallel.h"
@@ -58,7 +59,7 @@ struct Decay {
                 },
             .judge =
                 [this](const LongStepResult& result, std::span<float> moved, const Progress&) {
-                  ++judged;
+                  if (++judged > 1000) throw std::runtime_error("it does not come to an end");
                   move(result.result, moved);
                   return error;
                 }};
@@ -69,6 +70,21 @@ TEST(LongSteps, FifteenAreNotTooFew) {
   Decay decay{.error = 0};
   auto volume = volume_of(kLine, kBefore);
   EXPECT_GT(take_long_steps(*volume, 15, 0.01, decay.flow(), no_progress).long_steps, 0);
+}
+
+/// Whatever the judge says, and however few steps are left.
+TEST(LongSteps, ComeToAnEnd) {
+  constexpr double kTolerance = 0.01;
+  for (std::int64_t steps = 1; steps <= 100; ++steps)
+    for (double share = 0.5; share <= 2; share += 0.05) {
+      Decay decay{.error = share * kTolerance};
+      auto volume = volume_of(kLine, kBefore);
+      const StepsTaken taken = take_long_steps(*volume, steps, kTolerance, decay.flow(), no_progress);
+      EXPECT_LE(taken.rejected, 10 + steps / 5) << steps << " steps, error " << share << " of the tolerance";
+    }
+  Decay undefined{.error = std::numeric_limits<double>::quiet_NaN()};
+  auto volume = volume_of(kLine, kBefore);
+  EXPECT_EQ(take_long_steps(*volume, 100, kTolerance, undefined.flow(), no_progress).explicit_steps, 100);
 }
 
 /// The judge's sums decide which steps are taken.
