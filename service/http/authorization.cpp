@@ -20,14 +20,16 @@ std::string_view bearer_token(const Head& head) {
 
 }  // namespace
 
-tl::expected<Caller, Problem> authorize(const Head& head, const Route& route, const Tokens& tokens) {
+tl::expected<Caller, Problem> identify(const Head& head, const Route& route, const Tokens& tokens) {
   if (!route.scope) return Caller{};
-  auto caller = tokens.caller_with(bearer_token(head));
-  if (caller && !caller->may(*route.scope))
-    return tl::unexpected(Problem{"insufficient-scope",
-                                  "The token does not have the scope that this call needs.",
-                                  {{"scope", name_of(*route.scope)}}});
-  return caller;
+  return tokens.caller_with(bearer_token(head));
+}
+
+tl::expected<void, Problem> authorize(const Caller& caller, const Route& route) {
+  if (!route.scope || caller.may(*route.scope)) return {};
+  return tl::unexpected(Problem{"insufficient-scope",
+                                "The token does not have the scope that this call needs.",
+                                {{"scope", name_of(*route.scope)}}});
 }
 
 }  // namespace volsmooth

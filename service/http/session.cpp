@@ -142,11 +142,12 @@ tl::expected<void, Problem> Session::admit(Exchange& exchange) const {
   auto match = match_route(request.head.method, target->segments);
   if (!match) return tl::unexpected(match.error());
   exchange.route = match->route;
-  auto caller = authorize(request.head, *exchange.route, context_.api.jobs.tokens());
+  auto caller = identify(request.head, *exchange.route, context_.api.jobs.tokens());
   if (!caller) return tl::unexpected(caller.error());
   request.caller = std::move(*caller);
   if (!request.caller.token.empty()) context_.handshakes.know(peer_);
   request.path = std::move(match->path);
+  if (auto may = authorize(request.caller, *exchange.route); !may) return may;
   request.query = std::move(target->query);
   if (auto checked = check_query(*exchange.route, request.query); !checked) return checked;
 

@@ -11,11 +11,11 @@
 #include "service/http/handshake_limit.h"
 #include "service/http/host_check.h"
 #include "service/http/log.h"
-#include "service/jobs/refusal_rows.h"
 #include "service/http/routes.h"
 #include "service/http/server.h"
 #include "service/http/thread_pool.h"
 #include "service/http/wake.h"
+#include "service/jobs/refusal_rows.h"
 
 namespace volsmooth {
 

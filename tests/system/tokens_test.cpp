@@ -82,6 +82,20 @@ std::vector<std::pair<std::string, std::string>> audited(const std::filesystem::
   return rows;
 }
 
+/// Who probes with a valid token is whom an audit is for.
+TEST(Tokens, WhatTheirScopeDoesNotAllowIsAuditedWithWhoAndWhat) {
+  Daemon daemon(VOLSMOOTHD);
+  const std::string sender = make_token(daemon.data(), "sender", "submit");
+  const std::string volume = "v-aaaaaaaaaaaaaaaa";
+  EXPECT_EQ(
+      HttpConnection(daemon.port())
+          .exchange("GET", "/v1/volumes/" + volume + "/content", {}, {{"Authorization", "Bearer " + sender}})
+          .status,
+      403);
+  EXPECT_THAT(audited(daemon.data(), volume),
+              testing::ElementsAre(testing::Pair("sender", "GET /v1/volumes/{id}/content")));
+}
+
 TEST(Tokens, AreAuditedAsTheDoingOfTheUserWhoGaveTheCommand) {
   const std::string user = "uid:" + std::to_string(::geteuid());
   Daemon daemon(VOLSMOOTHD);
