@@ -110,7 +110,8 @@ Expected<nlohmann::json> Api::volume(std::string_view id) {
 }
 
 Expected<void> Api::delete_volume(std::string_view id) {
-  return nothing({.method = "DELETE", .target = volume_path(id)});
+  return nothing(
+      {.method = "DELETE", .target = volume_path(id), .interruptible = false, .timeout = kShortCall});
 }
 
 Expected<nlohmann::json> Api::submit(const Json& order) {

@@ -85,10 +85,12 @@ Failure broken(CURLcode code, const ServerAddress& server) {
   }
 }
 
-/// The connection was there and broke.
-bool is_answer_lost(CURLcode code) {
+/// The connection was there and broke, or nothing came over it for too long.
+bool is_answer_lost(CURLcode code, CURL* easy) {
+  long sent = 0;
+  curl_easy_getinfo(easy, CURLINFO_REQUEST_SIZE, &sent);
   return code == CURLE_GOT_NOTHING || code == CURLE_RECV_ERROR || code == CURLE_SEND_ERROR ||
-         code == CURLE_PARTIAL_FILE;
+         code == CURLE_PARTIAL_FILE || (code == CURLE_OPERATION_TIMEDOUT && sent > 0);
 }
 
 const Failure kInterruptedFailure{ExitCode::kInterrupted, "Interrupted.", {}};
@@ -227,7 +229,7 @@ HttpClient::Outcome HttpClient::send_once(const Request& request) {
   if (log_) log_(request.method + " " + request.target + " " + std::to_string(transfer.response.status));
   if (!end) return {tl::unexpected(kInterruptedFailure)};
   if (transfer.failure) return {tl::unexpected(*transfer.failure)};
-  if (*end != CURLE_OK) return {tl::unexpected(broken(*end, server_)), is_answer_lost(*end)};
+  if (*end != CURLE_OK) return {tl::unexpected(broken(*end, server_)), is_answer_lost(*end, handles_->easy)};
 
   const char* content_type = nullptr;
   curl_easy_getinfo(handles_->easy, CURLINFO_CONTENT_TYPE, &content_type);

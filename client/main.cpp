@@ -62,8 +62,10 @@ Expected<void> run(const Options& options, const Console& console) {
   if (options.command == "smooth") {
     if (const auto checked = check_inputs(options.inputs); !checked) return checked;
     if (const auto checked = check_stems(options.inputs); !checked) return checked;
-    if (options.server.empty()) return run_privately(options, console, interruption);
   }
+  // What asks for no volume or job that a server holds needs none.
+  const bool needs_no_server = options.command == "smooth" || options.command == "methods";
+  if (needs_no_server && options.server.empty()) return run_privately(options, console, interruption);
   auto server = parse_server(options.server.empty() ? kDefaultServer : options.server);
   if (!server) return tl::unexpected(server.error());
   server->ca_file = options.ca_file;
@@ -83,7 +85,7 @@ ExitCode run_and_tell(const Options& options) {
   } catch (const std::exception& error) {
     outcome = fail(ExitCode::kInternal, error.what());
   }
-  if (outcome && std::fflush(stdout) != 0) {
+  if (outcome && (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)) {
     outcome = fail(ExitCode::kCannotWrite, "Standard output cannot be written.");
   }
   if (outcome) return ExitCode::kDone;
@@ -112,5 +114,6 @@ int main(int argc, char** argv) {
   if (options) return static_cast<int>(run_and_tell(*options));
   const NoCommand& end = options.error();
   std::fputs(end.text.c_str(), end.code == ExitCode::kDone ? stdout : stderr);
-  return static_cast<int>(end.code);
+  const bool told = std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
+  return static_cast<int>(told ? end.code : ExitCode::kCannotWrite);
 }

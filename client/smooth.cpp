@@ -2,7 +2,9 @@
 
 #include <unistd.h>
 
+#include <chrono>
 #include <cstring>
+#include <thread>
 
 #include "client/catalogue.h"
 #include "client/names.h"
@@ -58,6 +60,17 @@ Expected<Json> run_job(const Options& options, const Session& session, const std
   return job;
 }
 
+/// A cancelled job lets go of its volume in a moment; one that goes on all the same keeps it.
+void give_up_volume(const Session& session, const std::string& id) {
+  constexpr int kTries = 20;
+  constexpr std::chrono::milliseconds kPause{150};
+  for (int tries = 1; tries <= kTries; ++tries) {
+    const auto deleted = session.api.delete_volume(id);
+    if (deleted || deleted.error().code == ExitCode::kUnreachable) return;
+    std::this_thread::sleep_for(kPause);
+  }
+}
+
 Expected<void> smooth_one(const Options& options, const Session& session, const OutputFolder& folder,
                           const std::filesystem::path& input) {
   const auto volume = upload_volume(session, input, options.query);
@@ -65,7 +78,7 @@ Expected<void> smooth_one(const Options& options, const Session& session, const 
   const auto volume_id = volume->at("id").get<std::string>();
   auto job = run_job(options, session, volume_id, name_of(input));
   if (!job) {
-    static_cast<void>(session.api.delete_volume(volume_id));  // a job that goes on all the same keeps it
+    give_up_volume(session, volume_id);
     return tl::unexpected(job.error());
   }
   if (const auto outcome = outcome_of(*job); !outcome) return outcome;

@@ -189,6 +189,20 @@ TEST_F(Http, SendsAKeyedRequestAgainWhenItsAnswerIsLost) {
   }
 }
 
+/// A server that syncs for longer than the client waits has made the job all the same.
+TEST_F(Http, SendsAKeyedRequestAgainThatIsNotAnsweredInTime) {
+  std::atomic<int> count = 0;
+  const CannedServer server(
+      [&](const auto&) { return ++count < 2 ? CannedAnswer{.bytes = "", .hold = true} : canned(202, "{}"); });
+  const Request request{.method = "POST",
+                        .target = "/",
+                        .body = "{}",
+                        .idempotency_key = "k",
+                        .timeout = std::chrono::seconds(1)};
+  EXPECT_EQ(send(server, request)->status, 202);
+  EXPECT_EQ(server.seen().size(), 2U);
+}
+
 TEST_F(Http, WaitsForARequestOfItsOwnThatIsStillUnderWay) {
   std::atomic<int> count = 0;
   const CannedServer server([&](const auto&) {

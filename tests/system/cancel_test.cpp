@@ -83,5 +83,32 @@ TEST(Cancel, AnInterruptedClientEndsWith130) {
   EXPECT_TRUE(!std::filesystem::exists(directory / "out") || names_in(directory / "out").empty());
 }
 
+/// What it has brought there is a patient's.
+TEST(Cancel, AnInterruptedClientLeavesNoVolumeOnTheServer) {
+  const TemporaryDirectory directory;
+  Daemon daemon(VOLSMOOTHD);
+  const ServiceClient service(daemon);
+  write_file(directory / "ball.nii", ball_file(160));
+  ClientRun client({"smooth", directory / "ball.nii", "-o", directory / "out", "--flow-time", "5000mm2",
+                    "--server", daemon.url()});
+  ASSERT_TRUE(eventually([&] { return !service.get("/v1/jobs?state=running").at("jobs").empty(); }));
+  client.process().signal(SIGINT);
+  EXPECT_EQ(client.exit_code(), 130) << client.error();
+  EXPECT_TRUE(service.get("/v1/volumes").at("volumes").empty());
+}
+
+TEST(ClientOutput, ThatCannotBeWrittenIsAnError) {
+  Daemon daemon(VOLSMOOTHD);
+  const TemporaryDirectory directory;
+  for (const std::vector<std::string>& arguments :
+       std::vector<std::vector<std::string>>{{"methods", "--server", daemon.url()},
+                                             {"--json", "methods", "--server", daemon.url()},
+                                             {"--help"}}) {
+    std::vector<std::string> command = arguments;
+    command.insert(command.begin(), VOLSMOOTH);
+    EXPECT_EQ(ChildProcess(command, "/dev/full", directory / "errors").wait(), 73) << arguments[0];
+  }
+}
+
 }  // namespace
 }  // namespace volsmooth::test
