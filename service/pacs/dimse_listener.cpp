@@ -98,6 +98,7 @@ DimseListener::~DimseListener() {
   accepting_.request_stop();
   if (accepting_.joinable()) accepting_.join();
   for (const Served& served : served_) served.child.kill();
+  served_.clear();  // their threads use the rest
 }
 
 void DimseListener::accept_all(const std::stop_token& stopped) {

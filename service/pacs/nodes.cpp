@@ -119,6 +119,9 @@ Node node_from(const std::string& name, const json& configured) {
     refuse_node(name, "'dicomweb' must be an http:// or https:// address");
   if (node.url.find_first_of(" ?#") != std::string::npos)
     refuse_node(name, "'dicomweb' must be an address without a query");
+  const std::size_t host = node.url.find("//") + 2;
+  if (node.url.substr(host, node.url.find('/', host) - host).find('@') != std::string::npos)
+    refuse_node(name, "'dicomweb' must be an address without a login; put that into a 'credentials_file'");
   while (node.url.ends_with('/')) node.url.pop_back();
   if (const std::string file = text_in(configured, name, "credentials_file"); !file.empty()) {
     std::string credentials = credentials_from(name, file);

@@ -36,11 +36,16 @@ tl::expected<int, NodeFailure> listed_instances(const Node& node, const std::str
   return static_cast<int>(list.size());
 }
 
+/// What comes is no multipart body.
+struct NoMultipart {};
+
 /// The boundary that a multipart body begins with, its first delimiter line being known.
 class BoundaryFinder {
  public:
-  /// Nothing until the first line is there.
+  /// Nothing until the first line is there. Throws NoMultipart when it does not come.
   std::optional<std::string> see(std::string_view bytes) {
+    constexpr std::size_t kLongestStart = std::size_t{64} << 10;
+    if (start_.size() > kLongestStart) throw NoMultipart();
     start_ += bytes;
     const std::size_t begin = start_.find("--");
     if (begin == std::string::npos) return std::nullopt;
@@ -65,7 +70,7 @@ tl::expected<void, NodeFailure> retrieve_series(const Node& node, const DicomSou
 
   BoundaryFinder finder;
   std::optional<PartCounter> counter;
-  bool too_large = false;
+  bool too_large = false, no_multipart = false;
   NodeRequest request{series, {"Accept: multipart/related; type=\"application/dicom\"; transfer-syntax=*"}};
   const auto fraction = [&] {
     return counter ? std::min(1.0, static_cast<double>(counter->parts()) / *listed) : 0.0;
@@ -86,10 +91,15 @@ tl::expected<void, NodeFailure> retrieve_series(const Node& node, const DicomSou
     answer = exchange(node, request);
   } catch (const TooLarge&) {
     too_large = true;
+  } catch (const NoMultipart&) {
+    no_multipart = true;
   }
   if (too_large)
     return failed("content-too-large", "The series is larger than an upload may be.", false,
                   {{"limit_bytes", max_bytes}});
+  if (no_multipart)
+    return failed("node-refused", "The node '" + node.name + "' gave no multipart/related body.", false,
+                  {{"node", node.name}});
   if (!answer) return tl::unexpected(answer.error());
   if (answer->status == kNoContent || answer->status == kNotFound) return not_there(node);
   if (answer->status != kOk) return tl::unexpected(failure_of_status(node, answer->status));

@@ -166,7 +166,8 @@ tl::expected<InputVolume, Problem> read_dicom(const std::filesystem::path& file,
 }
 
 tl::expected<std::vector<ArrivedInstance>, Problem> list_instances(const std::filesystem::path& file,
-                                                                   const PipelineLimits& limits) {
+                                                                   const PipelineLimits& limits,
+                                                                   const Progress& report) {
   const auto instances_in = [](const Json& answer) {
     std::vector<ArrivedInstance> instances;
     for (const Json& one : answer.at("instances"))
@@ -176,7 +177,7 @@ tl::expected<std::vector<ArrivedInstance>, Problem> list_instances(const std::fi
   };
   if (!is_dicom_upload(file))
     return tl::unexpected(Problem{"dicom-no-images", "The body holds no DICOM file."});
-  return ask("instances", open_upload(file), -1, 0, {}, limits, no_progress).map(instances_in);
+  return ask("instances", open_upload(file), -1, 0, {}, limits, report).map(instances_in);
 }
 
 }  // namespace volsmooth

@@ -25,6 +25,7 @@ tl::expected<InputVolume, Problem> read_dicom(const std::filesystem::path& file,
 
 /// Which instances a body of DICOM files holds, by volsmooth-ingest.
 tl::expected<std::vector<ArrivedInstance>, Problem> list_instances(const std::filesystem::path& file,
-                                                                   const PipelineLimits& limits);
+                                                                   const PipelineLimits& limits,
+                                                                   const Progress& report);
 
 }  // namespace volsmooth

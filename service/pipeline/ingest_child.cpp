@@ -94,12 +94,60 @@ double told_by(int progress) {
   return fraction > 0 && fraction < 1 ? fraction : fraction >= 1;
 }
 
+/// What the child may say, who has read what the client sent: others have no meaning to whoever is told.
+constexpr std::string_view kSlugs[] = {"decompression-limit",
+                                       "dicom-bad-attribute",
+                                       "dicom-bad-length",
+                                       "dicom-bad-orientation",
+                                       "dicom-bad-pixel-format",
+                                       "dicom-bad-rescale",
+                                       "dicom-bad-spacing",
+                                       "dicom-bad-vr",
+                                       "dicom-decode-failed",
+                                       "dicom-duplicate-slice",
+                                       "dicom-inconsistent-series",
+                                       "dicom-missing-attribute",
+                                       "dicom-mixed-patient",
+                                       "dicom-mixed-series",
+                                       "dicom-nesting",
+                                       "dicom-no-images",
+                                       "dicom-no-pixels",
+                                       "dicom-nonuniform-spacing",
+                                       "dicom-pixel-length",
+                                       "dicom-suspicious-preamble",
+                                       "dicom-too-few-slices",
+                                       "dicom-too-many-elements",
+                                       "dicom-transfer-syntax",
+                                       "dicom-truncated",
+                                       "dicom-unknown-series",
+                                       "dicom-unsupported-photometric",
+                                       "dicom-unsupported-sop-class",
+                                       "multipart-corrupt",
+                                       "multipart-too-many-parts",
+                                       "unsupported-format",
+                                       "volume-too-large",
+                                       "zip-corrupt",
+                                       "zip-duplicate-entry",
+                                       "zip-encrypted",
+                                       "zip-overlap",
+                                       "zip-too-many-entries",
+                                       "zip-unsafe-entry",
+                                       "zip-unsafe-name",
+                                       "zip-unsupported-method"};
+
 tl::expected<Json, Problem> parsed(const std::string& answer) {
+  const auto no_answer = [] { return decode_failed("The reader of DICOM gave no answer."); };
   Json document = Json::parse(answer, nullptr, false);
-  if (!document.is_object()) return tl::unexpected(decode_failed("The reader of DICOM gave no answer."));
+  if (!document.is_object()) return tl::unexpected(no_answer());
   const auto refusal = document.find("refusal");
   if (refusal == document.end()) return document;
-  return tl::unexpected(Problem{refusal->at("slug"), refusal->at("detail"), refusal->at("members")});
+  const bool is_one = refusal->is_object() && refusal->value("members", Json()).is_object() &&
+                      refusal->value("slug", Json()).is_string() &&
+                      refusal->value("detail", Json()).is_string();
+  if (!is_one) return tl::unexpected(no_answer());
+  Problem problem{refusal->at("slug"), refusal->at("detail"), refusal->at("members")};
+  if (std::ranges::find(kSlugs, problem.slug) == std::end(kSlugs)) return tl::unexpected(no_answer());
+  return tl::unexpected(std::move(problem));
 }
 
 }  // namespace

@@ -8,7 +8,8 @@
 namespace volsmooth {
 namespace {
 
-/// Of `plan_job`, so that both always say the same.
+/// Of `plan_job`, so that both say the same; for a flow so long that it takes long steps, which hold the
+/// most.
 Engine::MethodCost cost_of(const Method& method) {
   constexpr std::int64_t kSide = 256;
   constexpr double kVoxels = static_cast<double>(kSide * kSide * kSide);
@@ -24,7 +25,11 @@ Engine::MethodCost cost_of(const Method& method) {
     order.method = method.info.name;
     order.isovalues = isovalues;
     for (const ParameterInfo& info : method.info.parameters)
-      if (info.required) order.parameters[info.name] = info.is_isovalue ? 0.5 : 1.0;
+      if (info.name == "flow_time_mm2") {
+        order.parameters[info.name] = 1000.0;
+      } else if (info.required) {
+        order.parameters[info.name] = info.is_isovalue ? 0.5 : 1.0;
+      }
     const auto plan = plan_job(order, volume, {});
     return static_cast<double>(plan ? plan->memory_bytes : 0);
   };
@@ -43,7 +48,9 @@ Engine make_engine(const PipelineLimits& limits) {
   }
   engine.inspect = [limits](const std::filesystem::path& file, const UploadOptions& options,
                             const Progress& report) { return inspect_upload(file, options, limits, report); };
-  engine.instances = [limits](const std::filesystem::path& file) { return list_instances(file, limits); };
+  engine.instances = [limits](const std::filesystem::path& file, const Progress& report) {
+    return list_instances(file, limits, report);
+  };
   engine.plan = [limits](const JobOrder& order, const VolumeFacts& volume) {
     return plan_job(order, volume, limits);
   };

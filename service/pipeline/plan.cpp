@@ -69,6 +69,24 @@ tl::expected<void, Problem> check_distance(const ParameterValues& resolved, cons
               {{"member", "distance_mm"}, {"minimum", -sides}, {"maximum", sides}, {"unit", "mm"}}});
 }
 
+/// A density that reaches over more than there is, or over less than the voxels tell apart, says nothing of
+/// the surface: the volume would come back flat.
+tl::expected<void, Problem> check_half_width(const ParameterValues& resolved, const MethodInput& input) {
+  constexpr double kLeastOfRange = 1e-3;
+  const auto found = resolved.find("half_width");
+  const double range = input.intensity_max - input.intensity_min;
+  if (found == resolved.end() || !(range > 0)) return {};
+  const double half_width = std::get<double>(found->second);
+  if (half_width >= kLeastOfRange * range && half_width <= range) return {};
+  return tl::unexpected(
+      Problem{"bad-parameter",
+              "'half_width' must be from a thousandth of the range of the volume's intensities to all of it.",
+              {{"member", "half_width"},
+               {"minimum", kLeastOfRange * range},
+               {"maximum", range},
+               {"unit", "intensity"}}});
+}
+
 tl::expected<void, Problem> check_outputs(const JobOrder& order, const VolumeFacts& volume) {
   const auto is_dicom = [](const std::string& output) { return output.starts_with("dicom-"); };
   if (volume.format == "dicom" || std::ranges::none_of(order.outputs, is_dicom)) return {};
@@ -116,8 +134,8 @@ tl::expected<JobPlan, Problem> plan_job(const JobOrder& order, const VolumeFacts
   const auto voxels = static_cast<double>(voxel_count(input.grid.size));
   JobPlan plan;
   plan.parameters = method_called(order.method).resolve(order.parameters, input);
-  if (const auto checked = check_distance(plan.parameters, input); !checked)
-    return tl::unexpected(checked.error());
+  for (const auto& check : {check_distance, check_half_width})
+    if (const auto checked = check(plan.parameters, input); !checked) return tl::unexpected(checked.error());
 
   double steps = 0, extra_bytes_per_voxel = 0;
   const std::vector<Part> parts = parts_of(order, plan.parameters, input);

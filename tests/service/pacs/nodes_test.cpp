@@ -108,6 +108,7 @@ TEST_F(Nodes, WhatIsWrongIsRefusedWithItsPlace) {
       {{{"p", {{"dicomweb", 5}}}}, "'dicomweb' must be text"},
       {{{"p", {{"dicomweb", "file:///etc"}}}}, "'dicomweb' must be an http"},
       {{{"p", {{"dicomweb", "http://p?x=1"}}}}, "without a query"},
+      {{{"p", {{"dicomweb", "http://me:secret@p/x"}}}}, "without a login"},
       {{{"p", {{"dicomweb", "http://p"}, {"tls", true}}}}, "'tls' is not known"},
       {{{"p", {{"dicomweb", "http://p"}, {"tenant", {"a"}}}}}, "did you mean 'tenants'?"},
       {{{"p", {{"dicomweb", "http://p"}, {"tenants", "a"}}}}, "'tenants' must be a list of one or more"},

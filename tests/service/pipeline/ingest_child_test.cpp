@@ -50,7 +50,11 @@ TEST(IngestChild, RefusalIsAProblemWithItsMembers) {
 }
 
 TEST(IngestChild, DeathIsAProblemOfTheUpload) {
-  for (const char* death : {"kill -SEGV $$", "kill -SYS $$", "exit 1", "echo no JSON", "exit 0"}) {
+  for (const char* death : {"kill -SEGV $$", "kill -SYS $$", "exit 1", "echo no JSON", "exit 0",
+                            R"(echo '{"refusal": {"slug": "made-up", "detail": "", "members": {}}}')",
+                            R"(echo '{"refusal": {"slug": "internal", "detail": "", "members": {}}}')",
+                            R"(echo '{"refusal": {"slug": 5, "detail": "", "members": {}}}')",
+                            R"(echo '{"refusal": {"slug": "dicom-nesting"}}')", R"(echo '{"refusal": 5}')"}) {
     const auto refused = run_script(death);
     ASSERT_FALSE(refused) << death;
     EXPECT_EQ(refused.error().slug, "dicom-decode-failed") << death;

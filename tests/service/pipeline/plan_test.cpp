@@ -124,6 +124,20 @@ TEST(Plan, TheDensityAroundASurfaceIsATenthOfTheRangeWideByDefault) {
   EXPECT_NEAR(number(*plan, "half_width"), 402.4, 1e-9);
 }
 
+TEST(Plan, ADensityThatSaysNothingOfTheSurfaceIsRefused) {
+  JobOrder asked = order("mean-curvature-flow", 1);
+  asked.parameters["surface"] = 300.0;
+  for (const auto& [half_width, is_good] : std::vector<std::pair<double, bool>>{
+           {1e-30, false}, {4.0, false}, {4.1, true}, {4024, true}, {4025, false}, {3e38, false}}) {
+    asked.parameters["half_width"] = half_width;
+    const auto plan = plan_job(asked, head(), {});
+    EXPECT_EQ(plan.has_value(), is_good) << half_width;
+    if (!plan) {
+      EXPECT_EQ(plan.error().members.at("member"), "half_width");
+    }
+  }
+}
+
 TEST(Plan, AnOffsetLongerThanTheVolumeIsRefused) {
   JobOrder asked;
   asked.method = "offset";
