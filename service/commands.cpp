@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "service/control/control_socket.h"
+#include "service/jobs/data_folder.h"
 #include "service/jobs/job_json.h"
 #include "service/jobs/tokens.h"
 #include "service/storage/file_store.h"
@@ -80,11 +81,24 @@ json answer_about_tokens(Tokens& tokens, const json& request) {
 
 json answer_without_daemon(const std::filesystem::path& data_dir, const json& request) {
   if (request.at("command") == "status") return problem("no daemon runs on this data folder");
-  const FileStore files(data_dir);  // holds it for this process
-  StoreDatabase database(files.path_of("volsmooth.db"));
+  if (!std::filesystem::exists(data_dir / kDatabaseFile)) {
+    if (request.at("command") != "token create")
+      return problem("there is no database in " + data_dir.string() + "; give the daemon's --data");
+    std::cerr << "volsmoothd: " << data_dir.string()
+              << " is new: the token is for a daemon with this --data\n";
+  }
+  const FileStore files(own_data_folder(data_dir));  // holds it for this process
+  StoreDatabase database(files.path_of(kDatabaseFile));
   const ActingFor user(user_of_this_machine(::geteuid()));
   Tokens tokens(database);
   return answer_about_tokens(tokens, request);
+}
+
+json answer_to(const std::filesystem::path& data_dir, const json& request) {
+  const auto asked = ask_daemon(data_dir, request.dump());
+  json answer = asked ? json::parse(*asked) : answer_without_daemon(data_dir, request);
+  if (answer.contains("problem")) throw std::runtime_error(answer.at("problem").get<std::string>());
+  return answer;
 }
 
 std::string state_of(const json& token) {
@@ -142,10 +156,11 @@ int Commands::run(const std::filesystem::path& data_dir) const {
     request["tenant"] = tenant_;
     if (!lifetime_.empty()) request["expires_seconds"] = lifetime_from(lifetime_).count();
   }
-  const auto asked = ask_daemon(data_dir, request.dump());
-  const json answer = asked ? json::parse(*asked) : answer_without_daemon(data_dir, request);
-  if (answer.contains("problem")) throw std::runtime_error(answer.at("problem").get<std::string>());
-  if (answer.contains("token")) std::cout << answer.at("token").get<std::string>() << '\n';
+  const json answer = answer_to(data_dir, request);
+  if (answer.contains("token") && !(std::cout << answer.at("token").get<std::string>() << std::endl)) {
+    answer_to(data_dir, {{"command", "token revoke"}, {"name", name_}});
+    throw std::runtime_error("the token could not be printed, so it was revoked");
+  }
   if (answer.contains("tokens")) print_tokens(answer.at("tokens"));
   if (answer.contains("status")) std::cout << answer.at("status").get<std::string>() << '\n';
   return 0;
@@ -159,9 +174,9 @@ void audit_command(const std::filesystem::path& data_dir, const std::string& act
       throw std::runtime_error("the daemon could not audit this, so it is not done; see its log");
     return;
   }
-  const FileStore files(data_dir);  // holds it for this process
+  const FileStore files(own_data_folder(data_dir));  // holds it for this process
   const ActingFor user(user_of_this_machine(::geteuid()));
-  StoreDatabase(files.path_of("volsmooth.db")).record({action, object});
+  StoreDatabase(files.path_of(kDatabaseFile)).record({action, object});
 }
 
 std::string answer_command(JobService& jobs, const std::string& text, uid_t user) {

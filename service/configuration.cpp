@@ -7,8 +7,10 @@
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
+#include <iterator>
 #include <stdexcept>
 
+#include "service/jobs/strict_json.h"
 #include "service/pacs/configured.h"
 
 namespace volsmooth {
@@ -25,6 +27,12 @@ std::string text_of(const std::string& name, const json& value) {
 
 /// Options of a command line only.
 constexpr std::array<std::string_view, 4> kNotOfAFile = {"help", "version", "config", "print-config"};
+
+/// An empty variable counts as none, as CLI11 has it.
+bool is_set(const std::string& variable) {
+  const char* const value = std::getenv(variable.c_str());
+  return value != nullptr && *value != '\0';
+}
 
 /// A number or a truth as such, anything else as text.
 json value_from(const std::string& text) {
@@ -63,8 +71,8 @@ std::string JsonConfiguration::to_config(const CLI::App*, bool, bool, std::strin
 void read_environment_files(const CLI::App& app) {
   for (const CLI::Option* option : app.get_options()) {
     const std::string variable = option->get_envname();
-    const char* const file = variable.empty() ? nullptr : std::getenv((variable + "_FILE").c_str());
-    if (file == nullptr || std::getenv(variable.c_str()) != nullptr) continue;
+    if (variable.empty() || is_set(variable) || !is_set(variable + "_FILE")) continue;
+    const char* const file = std::getenv((variable + "_FILE").c_str());
     std::ifstream in(file);
     std::string line;
     if (!std::getline(in, line))
@@ -92,7 +100,9 @@ std::vector<std::string> unknown_variables(const CLI::App& app) {
 }
 
 std::vector<CLI::ConfigItem> JsonConfiguration::from_config(std::istream& input) const {
-  const json document = json::parse(input, nullptr, false);
+  const auto parsed = parse_json(std::string(std::istreambuf_iterator(input), {}));
+  if (!parsed) throw CLI::ConfigError("the configuration: " + parsed.error().detail);
+  const json& document = *parsed;
   if (!document.is_object())
     throw CLI::ConfigError(
         "the configuration is not a JSON object, such as {\"listen\": \"127.0.0.1:8742\"}");
@@ -108,7 +118,7 @@ std::vector<CLI::ConfigItem> JsonConfiguration::from_config(std::istream& input)
                              did_you_mean(name, known));
     // CLI11 itself would let the file come before the environment.
     const std::string variable = app_.get_option("--" + name)->get_envname();
-    if (!variable.empty() && std::getenv(variable.c_str()) != nullptr) continue;
+    if (!variable.empty() && is_set(variable)) continue;
     CLI::ConfigItem item;
     item.name = name;
     for (const json& one : value.is_array() ? value : json::array({value}))

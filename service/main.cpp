@@ -31,6 +31,7 @@
 #include "service/pacs/dimse_listener.h"
 #include "service/pacs/pacs.h"
 #include "service/pacs/presets.h"
+#include "service/pipeline/ingest_child.h"
 #include "service/pipeline/pipeline.h"
 #include "service/stage_times.h"
 
@@ -196,13 +197,12 @@ void keep_memory_of_answers() {
   ::mallopt(M_TRIM_THRESHOLD, 8 << 20);
 }
 
-/// Without TLS, SIGHUP ends the daemon like any program whose terminal goes.
-sigset_t awaited_signals(const Options& options) {
+sigset_t awaited_signals() {
   sigset_t set;
   sigemptyset(&set);
   sigaddset(&set, SIGTERM);
   sigaddset(&set, SIGINT);
-  if (!options.server.tls_certificate.empty()) sigaddset(&set, SIGHUP);
+  sigaddset(&set, SIGHUP);
   return set;
 }
 
@@ -262,11 +262,21 @@ void listen_for_commands(const Options& options, JobService& jobs, std::optional
   }
 }
 
+/// Without it every DICOM upload would fail, by no fault of its own.
+void require_ingest(const std::filesystem::path& given) {
+  const auto program = given.empty() ? ingest_beside_this_program() : given;
+  if (::access(program.c_str(), X_OK) != 0)
+    throw std::runtime_error("volsmooth-ingest, which reads DICOM, cannot be run: " + program.string() +
+                             (given.empty() ? " is missing; --ingest names it elsewhere" : " (--ingest)"));
+}
+
 void serve(const Options& options) {
+  require_ingest(options.ingest_program);
   std::optional<EphemeralFolder> folder;
   if (options.ephemeral) folder.emplace(options.jobs.data_dir);
 
   Metrics metrics;
+  std::atomic<bool> store_lost = false;
   JobService jobs(options.jobs,
                   with_stage_times(make_engine({.max_memory_bytes = options.jobs.memory_limit_bytes,
                                                 .ingest_program = options.ingest_program}),
@@ -278,7 +288,6 @@ void serve(const Options& options) {
     metrics.job_done(job);
     log_job(job);
   });
-  std::atomic<bool> store_lost = false;
   jobs.on_store_lost([&store_lost] {
     store_lost = true;
     ::kill(::getpid(), SIGTERM);
@@ -292,10 +301,12 @@ void serve(const Options& options) {
   jobs.start();
   log_event("ready", "volsmoothd " VOLSMOOTH_VERSION " listening on " + server.address());
 
-  const sigset_t signals = awaited_signals(options);
+  const sigset_t signals = awaited_signals();
   int received = 0;
-  while (sigwait(&signals, &received) == 0 && received == SIGHUP) reload_tls(server);
-  log_event("stopping", received == SIGTERM ? "SIGTERM" : "SIGINT");
+  // Without TLS there is nothing to read again: it stops, like any program whose terminal goes.
+  while (sigwait(&signals, &received) == 0 && received == SIGHUP && !options.server.tls_certificate.empty())
+    reload_tls(server);
+  log_event("stopping", std::string("SIG") + ::sigabbrev_np(received));
   jobs.stop();  // first: those whose uploads are being verified still get an answer
   listener.reset();
   control.reset();
@@ -306,7 +317,9 @@ void serve(const Options& options) {
 /// The exit code of what is done instead of serving.
 int guarded(const std::function<int()>& command) {
   try {
-    return command();
+    const int code = command();
+    if (!std::cout.flush()) throw std::runtime_error("standard output cannot be written to");
+    return code;
   } catch (const std::exception& error) {
     std::cerr << "volsmoothd: " << error.what() << '\n';
     return 1;
@@ -333,10 +346,11 @@ int run(int argc, char** argv) {
     std::cerr << "volsmoothd: " << error.what() << '\n';
     return kUsageError;
   }
-  if (options.print_configuration) {
-    std::cout << configuration->to_config(&app, true, false, {}) << '\n';
-    return 0;
-  }
+  if (options.print_configuration)
+    return guarded([&] {
+      std::cout << configuration->to_config(&app, true, false, {}) << '\n';
+      return 0;
+    });
   if (backup.asked()) return guarded([&] { return backup.run(options.jobs.data_dir); });
   if (audit.asked()) return guarded([&] { return audit.run(options.jobs.data_dir); });
   if (commands.asked()) return guarded([&] { return commands.run(options.jobs.data_dir); });
@@ -350,7 +364,7 @@ int run(int argc, char** argv) {
 
   keep_memory_of_answers();
   // Before any thread is there: all inherit the mask, and only sigwait takes them.
-  const sigset_t signals = awaited_signals(options);
+  const sigset_t signals = awaited_signals();
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   ::signal(SIGPIPE, SIG_IGN);
   start_log(options.log_level);

@@ -38,7 +38,7 @@ bool ArrivalStore::add(std::string_view tenant, std::string_view preset, const F
           instance.offset, instance.bytes, milliseconds_of(database_.now()), tenant);
     audit(database, preset, "instances received");
     const bool taken = database.query("SELECT 1 FROM arrivals WHERE file = ? LIMIT 1", file.name).step();
-    if (taken) insert_file(database, file);
+    if (taken) insert_file(database, file, database_.now());
     also(database);
     return taken;
   });

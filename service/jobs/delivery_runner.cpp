@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <memory>
 
 #include "service/jobs/retry_times.h"
 
@@ -19,38 +20,46 @@ Problem refused_problem(std::int64_t refused) {
           {{"refused", refused}}};
 }
 
+NodeFailure failure_of_sending(const std::exception& thrown) {
+  if (is_of_full_disk(thrown))
+    return {{"insufficient-storage", "The disk is too full to keep what the destination answers."}, true};
+  return {{"internal", "The results could not be sent; the fault is the service's, see its log."}, false};
+}
+
 }  // namespace
 
 WorkerPool::Work DeliveryRunner::claim() {
   const std::lock_guard lock(mutex_);
   if (stopping_) return {};
-  auto due = deliveries_.next_due(now_in_milliseconds(), sending_);
+  auto due = deliveries_.next_due(database_.now(), sending_);
   if (!due) return {};
   sending_.insert(due->job_id);
   return [this, due = *std::move(due)] { run(due); };
 }
 
 void DeliveryRunner::run(const DeliveryStore::Due& due) {
+  const auto end_sending = [this](const std::string* job_id) {
+    const std::lock_guard lock(mutex_);
+    sending_.erase(*job_id);
+  };
+  const std::unique_ptr<const std::string, decltype(end_sending)> sending(&due.job_id, end_sending);
   try {
     settle(due, send(due));
-    wake_(due.job_id);
-  } catch (const Cancelled&) {  // the next start goes on
+  } catch (const Cancelled&) {  // the next start goes on, unless there is nothing left to be sent
+    return;
   } catch (const std::exception& thrown) {
     spdlog::error("delivery of job {}: {}", due.job_id, thrown.what());
-    settle(due, tl::unexpected(NodeFailure{
-                    {"internal", "The results could not be sent; the fault is the service's, see its log."},
-                    false}));
+    settle(due, tl::unexpected(failure_of_sending(thrown)));
   }
-  const std::lock_guard lock(mutex_);
-  sending_.erase(due.job_id);
+  wake_(due.job_id);
 }
 
 tl::expected<void, NodeFailure> DeliveryRunner::send(const DeliveryStore::Due& due) {
   const auto job = jobs_.find(due.job_id);
   if (!job) throw Cancelled();  // deleted meanwhile, and the delivery with it
   const auto place = files_.path_of(results_directory(*job));
-  const auto keep_going = [this] {
-    if (stopping_) throw Cancelled();
+  const auto keep_going = [&] {
+    if (stopping_ || !jobs_.is_wanted(due.job_id)) throw Cancelled();
   };
   std::vector<DicomInstance> all;
   for (const Result& result : job->results) {
@@ -83,7 +92,7 @@ tl::expected<void, NodeFailure> DeliveryRunner::send(const DeliveryStore::Due& d
 }
 
 void DeliveryRunner::settle(const DeliveryStore::Due& due, const tl::expected<void, NodeFailure>& sent) {
-  const Time now = now_in_milliseconds();
+  const Time now = database_.now();
   if (!sent) {
     const Problem& problem = sent.error().problem;
     if (sent.error().is_passing && now - due.since < settings_.node_patience) {

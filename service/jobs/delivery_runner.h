@@ -24,6 +24,7 @@ class DeliveryRunner {
       : pacs_(pacs),
         stored_files_(stored_files),
         files_(files),
+        database_(database),
         jobs_(jobs),
         deliveries_(database),
         settings_(settings),
@@ -40,6 +41,7 @@ class DeliveryRunner {
   const Pacs& pacs_;
   StoredFiles& stored_files_;
   FileStore& files_;
+  const StoreDatabase& database_;
   JobStore& jobs_;
   DeliveryStore deliveries_;
   const JobServiceSettings& settings_;

@@ -82,7 +82,7 @@ std::vector<DicomInstance> DeliveryStore::pending(std::string_view job_id) {
 }
 
 void DeliveryStore::record(std::string_view job_id, std::span<const InstanceAnswer> answers) {
-  database_.write([&](Database& database) {
+  database_.write_at_any_rate([&](Database& database) {
     for (const InstanceAnswer& answer : answers)
       database.run(
           "UPDATE delivered_instances SET state = ?3, reason = ?4 "
@@ -93,7 +93,7 @@ void DeliveryStore::record(std::string_view job_id, std::span<const InstanceAnsw
 }
 
 void DeliveryStore::postpone(std::string_view job_id, Time until, const Problem& why) {
-  database_.write([&](Database& database) {
+  database_.write_at_any_rate([&](Database& database) {
     return database.run(
         "UPDATE deliveries SET tries = tries + 1, next_ms = ?2, error = ?3 "
         "WHERE job = (SELECT sequence FROM jobs WHERE id = ?1) AND state = 'pending'",
@@ -102,22 +102,26 @@ void DeliveryStore::postpone(std::string_view job_id, Time until, const Problem&
 }
 
 void DeliveryStore::finish(std::string_view job_id, const std::optional<Problem>& why) {
-  database_.write([&](Database& database) {
+  database_.write_at_any_rate([&](Database& database) {
     std::optional<std::string> error;
     if (why) error = problem_to_stored_json(*why).dump();
     const DeliveryState state = why ? DeliveryState::kFailed : DeliveryState::kDelivered;
+    const bool was_pending =
+        database.run(
+            "UPDATE deliveries SET state = ?2, error = ?3 "
+            "WHERE job = (SELECT sequence FROM jobs WHERE id = ?1) AND state = 'pending'",
+            job_id, name_of(state), error) > 0;
+    if (!was_pending) return false;  // it was deleted with its job
     const std::string action =
         (why ? "delivery failed to " : "delivered to ") + destination_of(database, job_id);
     audit(database, AuditEntry{action, std::string(job_id), why ? why->slug : "done"});
-    return database.run(
-        "UPDATE deliveries SET state = ?2, error = ?3 WHERE job = (SELECT sequence FROM jobs WHERE id = ?1)",
-        job_id, name_of(state), error);
+    return true;
   });
 }
 
 bool DeliveryStore::retry(std::string_view job_id) {
   return database_.write([&](Database& database) {
-    const std::int64_t now = milliseconds_of(now_in_milliseconds());
+    const std::int64_t now = milliseconds_of(database_.now());
     const bool failed = database.run(
                             "UPDATE deliveries SET state = 'pending', next_ms = ?2, since_ms = ?2 "
                             "WHERE job = (SELECT sequence FROM jobs WHERE id = ?1) AND state = 'failed'",
@@ -132,12 +136,11 @@ bool DeliveryStore::retry(std::string_view job_id) {
   });
 }
 
-void insert_delivery(Database& database, std::string_view job_id, std::string_view destination) {
-  const std::int64_t now = milliseconds_of(now_in_milliseconds());
+void insert_delivery(Database& database, std::string_view job_id, std::string_view destination, Time now) {
   database.run(
       "INSERT INTO deliveries (job, destination, state, tries, next_ms, since_ms) "
       "SELECT sequence, ?2, 'pending', 0, ?3, ?3 FROM jobs WHERE id = ?1",
-      job_id, destination, now);
+      job_id, destination, milliseconds_of(now));
 }
 
 std::optional<Delivery> delivery_of(Database& database, std::int64_t job_sequence) {

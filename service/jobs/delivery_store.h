@@ -44,7 +44,7 @@ class DeliveryStore {
 };
 
 /// Part of the transaction that makes the job succeed.
-void insert_delivery(Database& database, std::string_view job_id, std::string_view destination);
+void insert_delivery(Database& database, std::string_view job_id, std::string_view destination, Time now);
 std::optional<Delivery> delivery_of(Database& database, std::int64_t job_sequence);
 
 }  // namespace volsmooth

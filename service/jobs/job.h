@@ -193,7 +193,8 @@ struct Engine {
                                                    const UploadOptions& options, const Progress& report)>
       inspect;
   /// The instances in a file that a device sent, before they are a series.
-  std::function<tl::expected<std::vector<ArrivedInstance>, Problem>(const std::filesystem::path& file)>
+  std::function<tl::expected<std::vector<ArrivedInstance>, Problem>(const std::filesystem::path& file,
+                                                                    const Progress& report)>
       instances;
   /// Checks an order against its volume and resolves its parameters; cheap.
   std::function<tl::expected<JobPlan, Problem>(const JobOrder& order, const VolumeFacts& volume)> plan;

@@ -110,7 +110,7 @@ tl::expected<std::vector<ArrivedInstance>, Problem> JobService::receive(const Ca
   if (auto within = state_->within_quota(caller, file.bytes()); !within)
     return tl::unexpected(std::move(within.error()));
   const std::string sha256 = file.finish();
-  auto instances = state_->engine.instances(file.path());
+  auto instances = state_->instances_in(file.path());
   if (!instances) return instances;
   const std::string place = new_arrival_file();
   const FileRecord record{place, file.bytes(), sha256, file.block_sums()};
@@ -279,6 +279,10 @@ tl::expected<std::vector<LedgerEntry>, Problem> JobService::ledger(const Caller&
 
 tl::expected<Job, Problem> JobService::deliver_again(const Caller& caller, std::string_view job_id) {
   const auto found = job(caller, job_id);
+  if (found && found->order.destination.empty())
+    return refuse("bad-parameter",
+                  "The job has no destination; name one as 'destination' in the order of another.",
+                  {{"member", "destination"}});
   if (!found || !state_->deliveries.retry(job_id)) return found;
   state_->delivering.wake();
   return job(caller, job_id);

@@ -106,7 +106,7 @@ std::string results_directory(std::string_view job_id, std::int64_t attempt) {
 }
 
 void insert_results(Database& database, std::string_view job_id, std::int64_t attempt,
-                    const std::vector<Result>& results) {
+                    const std::vector<Result>& results, Time now) {
   for (std::size_t position = 0; position < results.size(); ++position) {
     const Result& result = results[position];
     database.run(
@@ -115,8 +115,10 @@ void insert_results(Database& database, std::string_view job_id, std::int64_t at
         "bytes, sha256) SELECT sequence, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11 FROM jobs WHERE id = ?1",
         job_id, position, result.name, result.kind, result.method, json(result.isovalues).dump(),
         result.many_surfaces, result.frame, result.media_type, result.bytes, result.sha256);
-    insert_file(database, {results_directory(job_id, attempt) + "/" + result.name, result.bytes,
-                           result.sha256, result.block_sums});
+    insert_file(database,
+                {results_directory(job_id, attempt) + "/" + result.name, result.bytes, result.sha256,
+                 result.block_sums},
+                now);
   }
 }
 
@@ -288,11 +290,11 @@ bool JobStore::change_in(Database& database, const JobChange& change) {
   for (const NumberedEvent& event : change.progress_events) insert_event(database, change.id, event);
   insert_event(database, change.id,
                {events_.next(), "state", state_event_data(change.id, change.to, finished, change.error)});
-  insert_results(database, change.id, change.attempt, change.results);
+  insert_results(database, change.id, change.attempt, change.results, now);
   if (change.retrieved) take_retrieved(database, change.id, *change.retrieved);
   if (change.to == JobState::kSucceeded)
     if (const auto job = find_in(database, change.id); !job->order.destination.empty())
-      insert_delivery(database, change.id, job->order.destination);
+      insert_delivery(database, change.id, job->order.destination, now);
   audit(database, change.id, "job " + std::string(name_of(change.to)));
   return true;
 }

@@ -3,6 +3,8 @@
 #include <atomic>
 #include <chrono>
 #include <functional>
+#include <map>
+#include <string>
 
 #include "service/jobs/stored_files.h"
 #include "service/jobs/worker_pool.h"
@@ -17,15 +19,16 @@ class Scrubber {
            const std::atomic<bool>& stopping)
       : files_(files), period_(period), clock_(clock), stopping_(stopping) {}
 
-  WorkerPool::Work claim();  ///< for one thread at a time
+  WorkerPool::Work claim();  ///< for one thread at a time, which does the work before it claims again
 
  private:
-  void check(const std::string& name) const;
+  void check(const std::string& name);
 
   StoredFiles& files_;
   const std::chrono::milliseconds period_;
   const std::function<Time()>& clock_;
   const std::atomic<bool>& stopping_;
+  std::map<std::string, Time> unreadable_;  ///< and when that came out
 };
 
 }  // namespace volsmooth

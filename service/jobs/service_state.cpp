@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include "service/jobs/data_folder.h"
 #include "service/jobs/ids.h"
 #include "service/jobs/job_json.h"
 #include "service/jobs/machine.h"
@@ -43,8 +44,8 @@ JobService::State::State(JobServiceSettings given, Engine computing, Pacs networ
     : settings(completed(std::move(given))),
       engine(std::move(computing)),
       pacs(std::move(network)),
-      files(settings.data_dir, settings.reserved_disk_bytes),
-      database(files.path_of("volsmooth.db"), kCheckedFirst, settings.clock),
+      files(own_data_folder(settings.data_dir), settings.reserved_disk_bytes),
+      database(files.path_of(kDatabaseFile), kCheckedFirst, settings.clock),
       stored_files(database, files),
       tokens(database),
       cursors(database),
@@ -271,19 +272,30 @@ void JobService::State::tell_final(const Job& job) const {
   if (observer) observer(job);
 }
 
-tl::expected<VolumeFacts, Problem> JobService::State::verify(const std::filesystem::path& file,
-                                                             const UploadOptions& options) const {
+/// What a reader finds in an upload, unless the service stops meanwhile.
+auto JobService::State::until_stopped(const auto& reader) const {
+  using Found = std::invoke_result_t<decltype(reader), const Progress&>;
   const Progress unless_stopping = [this](double) {
     if (stopping) throw Cancelled();
   };
   try {
     unless_stopping(0);
-    auto facts = engine.inspect(file, options, unless_stopping);
-    if (!facts) unless_stopping(1);  // what stops the service may have brought down the reader as well
-    return facts;
+    Found found = reader(unless_stopping);
+    if (!found) unless_stopping(1);  // what stops the service may have brought down the reader as well
+    return found;
   } catch (const Cancelled&) {
-    return refuse("not-ready", "The service is stopping; upload the volume again when it is back.");
+    return Found(refuse("not-ready", "The service is stopping; send this again when it is back."));
   }
+}
+
+tl::expected<VolumeFacts, Problem> JobService::State::verify(const std::filesystem::path& file,
+                                                             const UploadOptions& options) const {
+  return until_stopped([&](const Progress& report) { return engine.inspect(file, options, report); });
+}
+
+tl::expected<std::vector<ArrivedInstance>, Problem> JobService::State::instances_in(
+    const std::filesystem::path& file) const {
+  return until_stopped([&](const Progress& report) { return engine.instances(file, report); });
 }
 
 tl::unexpected<Problem> JobService::State::missing(const Caller& caller, std::string_view id,

@@ -69,6 +69,9 @@ struct JobService::State {
   /// What the engine says of an upload; not-ready when the service is stopped meanwhile.
   tl::expected<VolumeFacts, Problem> verify(const std::filesystem::path& file,
                                             const UploadOptions& options) const;
+  tl::expected<std::vector<ArrivedInstance>, Problem> instances_in(
+      const std::filesystem::path& file) const;  ///< likewise
+  auto until_stopped(const auto& reader) const;
   /// Why there is nothing of that id for the caller: bad-id, gone or not-found.
   tl::unexpected<Problem> missing(const Caller& caller, std::string_view id, std::string_view what);
   /// The same, but deleted is what it should be.

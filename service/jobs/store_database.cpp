@@ -328,6 +328,24 @@ void undo(Savepoint& savepoint, const std::exception_ptr& failure) {
   }
 }
 
+/// A connection that does not wait for others, as long as this lives.
+class Impatience {
+ public:
+  explicit Impatience(Database& database) : database_(database) {
+    database_.execute("PRAGMA busy_timeout = 0");
+  }
+  ~Impatience() {
+    try {
+      database_.execute("PRAGMA busy_timeout = 5000");
+    } catch (const DatabaseError&) {  // it only waits less
+    }
+  }
+  Impatience(const Impatience&) = delete;
+
+ private:
+  Database& database_;
+};
+
 }  // namespace
 
 StoreDatabase::StoreDatabase(const std::filesystem::path& file, CheckFirst check, std::function<Time()> clock)
@@ -451,11 +469,10 @@ void StoreDatabase::clear_log() {
       if (!reading.back()) return;  // another time: all that is to be stored would wait along
     }
     // Whoever else reads the file, such as a backup, is not waited for either.
-    writer_.execute("PRAGMA busy_timeout = 0");
+    const Impatience no_waiting(writer_);
     Statement outcome = writer_.query("PRAGMA wal_checkpoint(TRUNCATE)");
     outcome.step();
     log_holds_deleted_ = outcome.integer(0) != 0;
-    writer_.execute("PRAGMA busy_timeout = 5000");
   });
 }
 

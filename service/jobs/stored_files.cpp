@@ -22,10 +22,10 @@ bool is_whole(const FileRecord& file, const FileDigest& found) {
 
 }  // namespace
 
-void insert_file(Database& database, const FileRecord& file) {
+void insert_file(Database& database, const FileRecord& file, Time now) {
   database.run(
       "INSERT INTO stored_files (name, bytes, sha256, block_sums, checked_ms) VALUES (?, ?, ?, ?, ?)",
-      file.name, file.bytes, file.sha256, file.block_sums, milliseconds_of(now_in_milliseconds()));
+      file.name, file.bytes, file.sha256, file.block_sums, milliseconds_of(now));
 }
 
 void forget_file(Database& database, std::string_view name) {
@@ -83,14 +83,16 @@ bool StoredFiles::check(const std::string& name, const std::function<void()>& be
   return !record(name, !whole, found) || whole;
 }
 
-std::optional<std::string> StoredFiles::due(Time since, Time damaged_since) {
+std::optional<std::string> StoredFiles::due(Time since, Time damaged_since,
+                                            const std::map<std::string, Time>& but_not) {
   return database_.read([&](Database& database) -> std::optional<std::string> {
     const auto oldest = [&](std::string_view condition, Time before) -> std::optional<std::string> {
       Statement row = database.query("SELECT name FROM stored_files WHERE " + std::string(condition) +
-                                         " checked_ms <= ? ORDER BY checked_ms LIMIT 1",
+                                         " checked_ms <= ? ORDER BY checked_ms",
                                      milliseconds_of(before));
-      if (!row.step()) return std::nullopt;
-      return row.text(0);
+      while (row.step())
+        if (!but_not.contains(row.text(0))) return row.text(0);
+      return std::nullopt;
     };
     if (auto again = oldest("damaged = 1 AND", damaged_since)) return again;
     return oldest("", since);
@@ -104,7 +106,7 @@ bool StoredFiles::record(const std::string& name, bool damaged, const FileDigest
                "UPDATE stored_files SET checked_ms = ?2, damaged = ?3, "
                "bytes = CASE ?3 WHEN 0 THEN ?4 ELSE bytes END, "
                "block_sums = CASE ?3 WHEN 0 THEN ?5 ELSE block_sums END WHERE name = ?1",
-               name, milliseconds_of(now_in_milliseconds()), damaged, found.bytes, found.block_sums) > 0;
+               name, milliseconds_of(database_.now()), damaged, found.bytes, found.block_sums) > 0;
   });
   if (known && damaged) spdlog::critical("stored file {} is damaged; it is not given out", name);
   return known;

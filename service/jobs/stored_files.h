@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -24,7 +25,7 @@ struct FileRecord {
 
 // Rows of stored files, each written and deleted in the transaction of the row that points to the file.
 
-void insert_file(Database& database, const FileRecord& file);
+void insert_file(Database& database, const FileRecord& file, Time now);
 void forget_file(Database& database, std::string_view name);
 void forget_files_in(Database& database, std::string_view directory);
 
@@ -44,8 +45,9 @@ class StoredFiles {
   bool check(
       const std::string& name, const std::function<void()>& between_blocks = [] {});
 
-  /// The file that was checked longest ago, before `since`; of damaged ones, before `damaged_since`.
-  std::optional<std::string> due(Time since, Time damaged_since);
+  /// The file that was checked longest ago, before `since`; of damaged ones, before `damaged_since`. None of
+  /// `but_not`.
+  std::optional<std::string> due(Time since, Time damaged_since, const std::map<std::string, Time>& but_not);
 
  private:
   struct Row {

@@ -32,7 +32,8 @@ std::string volume_file(std::string_view volume_id) {
 
 int insert_volume(Database& database, const StoredVolume& volume) {
   audit(database, volume.id, "volume stored");
-  insert_file(database, {volume_file(volume.id), volume.bytes, volume.sha256, volume.block_sums});
+  insert_file(database, {volume_file(volume.id), volume.bytes, volume.sha256, volume.block_sums},
+              volume.created_at);
   return database.run(
       "INSERT INTO volumes (id, options, facts, bytes, sha256, created_ms, tenant, expires_ms) VALUES "
       "(?, ?, ?, ?, ?, ?, ?, ?)",

@@ -55,8 +55,9 @@ void WorkerPool::run() {
         worked = true;
         work();
       }
-    } catch (const std::exception& error) {
+    } catch (const std::exception& error) {  // the same work may be there again: not at once
       spdlog::error("worker: {}", error.what());
+      worked = false;
     }
     if (worked) wake();  // what it held is free again
     lock.lock();

@@ -15,7 +15,8 @@ class WorkerPool {
  public:
   using Work = std::function<void()>;  ///< empty: nothing may start now
 
-  /// `claim` is called by any of the threads, several at once.
+  /// `claim` is called by any of the threads, several at once. Whoever meets an exception of it or of its
+  /// work waits for a second, or to be woken.
   WorkerPool(int workers, std::function<Work()> claim) : workers_(workers), claim_(std::move(claim)) {}
   ~WorkerPool() { stop(); }
 

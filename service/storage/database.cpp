@@ -191,7 +191,7 @@ void Transaction::commit() {
     database_.run("COMMIT");
     open_ = false;
   } catch (const DatabaseError& error) {
-    database_.condemned_ = !surely_undone(error.code());
+    if (!surely_undone(error.code())) database_.condemned_ = true;
     throw;
   }
 }

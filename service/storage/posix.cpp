@@ -26,7 +26,8 @@ void FileDescriptor::close() {
 
 FileDescriptor open_file(const std::filesystem::path& path, int flags) {
   const int descriptor = ::open(path.c_str(), flags | O_CLOEXEC, S_IRUSR | S_IWUSR);
-  if (descriptor < 0) throw_errno("open");
+  if (const int error = errno; descriptor < 0)
+    throw std::system_error(error, std::generic_category(), "open " + path.string());
   return FileDescriptor(descriptor);
 }
 

@@ -129,6 +129,104 @@ TEST_F(OperatingTest, WhatIsWrongWithTlsOfDimseStopsTheStart) {
   }
 }
 
+/// An unset variable of a compose file comes as an empty one.
+TEST_F(OperatingTest, AnEmptyVariableIsNone) {
+  const std::string file = file_with(R"({"require-tokens": true, "tls-cert": "/a", "keep-days": 3})");
+  const auto read = run({"--data", "/d", "--print-config", "--config", file},
+                        {"VOLSMOOTH_REQUIRE_TOKENS=", "VOLSMOOTH_TLS_CERT=", "VOLSMOOTH_KEEP_DAYS=",
+                         "VOLSMOOTH_QUEUE=", "VOLSMOOTH_QUEUE_FILE=" + file_with("7\n")});
+  const json in_force = json::parse(read.output);
+  EXPECT_EQ(in_force.at("require-tokens"), true);
+  EXPECT_EQ(in_force.at("tls-cert"), "/a");
+  EXPECT_EQ(in_force.at("keep-days"), 3);
+  EXPECT_EQ(in_force.at("queue"), 7);
+}
+
+TEST_F(OperatingTest, AMemberTwiceIsRefused) {
+  for (const char* text : {R"({"keep-days": 3, "keep-days": 4})",
+                           R"({"presets": {"p": {"from": ["10.1.0.0/16"], "from": ["0.0.0.0/0"]}}})"}) {
+    const auto refused = run({"--data", "/d", "--print-config", "--config", file_with(text)});
+    EXPECT_EQ(refused.exit_code, 2) << text;
+    EXPECT_THAT(refused.errors, HasSubstr("configuration")) << text;
+  }
+}
+
+/// A start removes what no row points to, and here nothing has one.
+TEST_F(OperatingTest, AFolderThatIsNotTheDaemonsIsLeftAsItIs) {
+  const fs::path folder = folder_ / "study";
+  const std::vector<fs::path> files{folder / "volumes/a", folder / "results/j/b", folder / "arrivals/c",
+                                    folder / "tmp/d"};
+  for (const fs::path& file : files) {
+    fs::remove_all(folder);
+    fs::create_directories(file.parent_path());
+    std::ofstream(file) << "precious";
+    for (const std::vector<std::string>& command : std::vector<std::vector<std::string>>{
+             {"--listen", "127.0.0.1:0"}, {"token", "create", "--name", "a", "--scope", "read"}}) {
+      std::vector<std::string> options = command;
+      options.insert(options.end(), {"--data", folder});
+      const auto refused = run(options);
+      EXPECT_EQ(refused.exit_code, 1);
+      EXPECT_THAT(refused.errors, HasSubstr("has no volsmooth.db but holds other things"));
+    }
+    EXPECT_EQ(content_of(file), "precious");
+  }
+}
+
+TEST_F(OperatingTest, AFolderWhoseDatabaseIsLostKeepsItsVolumes) {
+  Daemon daemon(VOLSMOOTHD);
+  const std::string id = ServiceClient(daemon).upload(ball_file(16)).at("id");
+  ASSERT_EQ(daemon.terminate(), 0);
+  const fs::path database = daemon.data() / "volsmooth.db";
+  fs::rename(database, folder_ / "aside");
+  EXPECT_THROW(daemon.start(), std::runtime_error);
+  EXPECT_TRUE(fs::exists(daemon.data() / "volumes" / id));
+  fs::rename(folder_ / "aside", database);
+  daemon.start();
+  EXPECT_EQ(ServiceClient(daemon).call("GET", "/v1/volumes/" + id + "/content").status, 200);
+}
+
+TEST_F(OperatingTest, ATokenForANewFolderIsMadeAndListingOneIsNot) {
+  const fs::path folder = folder_ / "new";
+  for (const std::vector<std::string>& command :
+       std::vector<std::vector<std::string>>{{"token", "list"}, {"token", "revoke", "--name", "a"}}) {
+    std::vector<std::string> options = command;
+    options.insert(options.end(), {"--data", folder});
+    EXPECT_EQ(run(options).exit_code, 1);
+    EXPECT_FALSE(fs::exists(folder));
+  }
+  const auto made = run({"token", "create", "--name", "a", "--scope", "read", "--data", folder});
+  EXPECT_EQ(made.exit_code, 0);
+  EXPECT_THAT(made.errors, HasSubstr("is new"));
+}
+
+TEST_F(OperatingTest, WhatCannotBePrintedIsAnError) {
+  const fs::path folder = folder_ / "new", errors = folder_ / "errors";
+  const auto onto_full_disk = [&](std::vector<std::string> command) {
+    command.insert(command.begin(), VOLSMOOTHD);
+    command.insert(command.end(), {"--data", folder});
+    return ChildProcess(command, "/dev/full", errors).wait();
+  };
+  EXPECT_EQ(onto_full_disk({"token", "create", "--name", "lost", "--scope", "admin"}), 1);
+  EXPECT_THAT(run({"token", "list", "--data", folder}).output, testing::ContainsRegex("lost.*revoked"));
+  for (const std::vector<std::string>& command : std::vector<std::vector<std::string>>{
+           {"token", "list"}, {"audit", "export"}, {"audit", "verify"}, {"--print-config"}})
+    EXPECT_EQ(onto_full_disk(command), 1) << command.back();
+}
+
+TEST_F(OperatingTest, WithoutTheReaderOfDicomItDoesNotStart) {
+  const auto refused =
+      run({"--listen", "127.0.0.1:0", "--data", folder_ / "data", "--ingest", folder_ / "nothing"});
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_THAT(refused.errors, HasSubstr((folder_ / "nothing").string()));
+}
+
+TEST_F(OperatingTest, WithoutTlsAHangUpStopsItInOrder) {
+  Daemon daemon(VOLSMOOTHD);
+  ::kill(daemon.pid(), SIGHUP);
+  EXPECT_EQ(daemon.wait(), 0);
+  EXPECT_THAT(daemon.log(), HasSubstr("SIGHUP"));
+}
+
 TEST_F(OperatingTest, MetricsHaveTheTimeOfEveryStage) {
   Daemon daemon(VOLSMOOTHD);
   const ServiceClient service(daemon);

@@ -21,7 +21,7 @@ class ExpiryTest : public JobServiceTest {
     wanted.keep = keep;
     wanted.clock = [this] { return start_ + ahead_.load(); };
     auto engine = fake_.engine();
-    engine.instances = [](const auto&) -> tl::expected<std::vector<ArrivedInstance>, Problem> {
+    engine.instances = [](const auto&, const auto&) -> tl::expected<std::vector<ArrivedInstance>, Problem> {
       return std::vector<ArrivedInstance>{{"1.2", "1.2.3", "1.2.3.4", "1.2.3.4.5", 0, 6}};
     };
     service_.reset();

@@ -89,7 +89,7 @@ class PacsJobs : public JobServiceTest {
                                  FakeEngine::result("report.json", "report")};
     };
     if (fake_instances_)
-      engine.instances = [](const auto&) -> tl::expected<std::vector<ArrivedInstance>, Problem> {
+      engine.instances = [](const auto&, const auto&) -> tl::expected<std::vector<ArrivedInstance>, Problem> {
         return std::vector<ArrivedInstance>{{"1.2", "1.2.3", "1.2.3.4", "1.2.3.4.5", 0, 1}};
       };
     service_.reset();
@@ -487,7 +487,7 @@ TEST_F(PacsJobs, AJobWithoutDestinationHasAnEmptyLedger) {
   const Job done = wait_for(*service_, service_->submit(kAnyone, order_for(volume.id)).value().id);
   EXPECT_FALSE(done.delivery);
   EXPECT_TRUE(service_->ledger(kAnyone, done.id)->empty());
-  EXPECT_FALSE(service_->deliver_again(kAnyone, done.id)->delivery);
+  EXPECT_EQ(slug_of(service_->deliver_again(kAnyone, done.id)), "bad-parameter");
   EXPECT_EQ(slug_of(service_->ledger(kAnyone, "j-aaaaaaaaaaaaaaaa")), "not-found");
   EXPECT_EQ(slug_of(service_->deliver_again(kAnyone, "j-aaaaaaaaaaaaaaaa")), "not-found");
 }
@@ -502,6 +502,36 @@ TEST_F(PacsJobs, ADeletedJobIsNotDelivered) {
   node_.up = true;
   std::this_thread::sleep_for(100ms);
   EXPECT_TRUE(node_.received.empty());
+}
+
+TEST_F(PacsJobs, ADeletedJobIsNotDeliveredAnyFurther) {
+  node_.silent = true;
+  open();
+  const std::string id = service_->submit(kAnyone, delivery_order()).value().id;
+  while (node_.asked == 0) std::this_thread::sleep_for(1ms);
+  ASSERT_TRUE(service_->delete_job(kAnyone, id));
+  std::this_thread::sleep_for(500ms);  // it is asked whether to go on every 10 ms
+  node_.silent = false;
+  std::this_thread::sleep_for(100ms);
+  EXPECT_TRUE(node_.received.empty());
+  EXPECT_EQ(audited(settings().data_dir, id).back(), "job deleted: done");
+}
+
+TEST_F(PacsJobs, ADeliveryThatAFullDiskEndsGoesOnWhenThereIsRoom) {
+  node_.up = false;
+  open();
+  const std::string id = service_->submit(kAnyone, delivery_order()).value().id;
+  while (!service_->job(kAnyone, id)->delivery || service_->job(kAnyone, id)->delivery->tries == 0)
+    std::this_thread::sleep_for(1ms);
+  {
+    const DiskCalls disk(settings().data_dir, [](const std::string& call) {
+      return call == "write volsmooth.db-wal" ? ENOSPC : 0;
+    });
+    node_.up = true;
+    std::this_thread::sleep_for(300ms);  // it is tried every 20 ms, until the disk ends it
+    EXPECT_EQ(service_->job(kAnyone, id)->delivery->state, DeliveryState::kPending);
+  }
+  EXPECT_EQ(delivered(id, DeliveryState::kDelivered).delivery->stored, 2);
 }
 
 /// Instances of the series "1.2.3.<digit>", one a digit of the file.
@@ -521,7 +551,7 @@ class PresetJobs : public JobServiceTest {
  protected:
   void open(std::chrono::milliseconds quiet = 1ms) {
     auto engine = fake_.engine();
-    engine.instances = [this](const std::filesystem::path& file) {
+    engine.instances = [this](const std::filesystem::path& file, const Progress&) {
       auto instances = instances_of_digits(file);
       if (const auto meanwhile = std::exchange(while_read_, {})) meanwhile();
       return instances;

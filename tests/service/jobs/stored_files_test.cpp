@@ -24,7 +24,7 @@ class StoredFilesTest : public testing::Test {
     const FileRecord record{name, file.bytes(), file.finish(), file.block_sums()};
     files_.adopt(std::move(file), name);
     database_.write([&](Database& database) {
-      insert_file(database, record);
+      insert_file(database, record, database_.now());
       return true;
     });
   }
@@ -83,12 +83,12 @@ TEST_F(StoredFilesTest, AMissingFileIsDamagedUnlessItWasDeleted) {
 TEST_F(StoredFilesTest, FilesOfBeforeGetTheirSumsWhenTheyAreFirstRead) {
   run("UPDATE stored_files SET block_sums = '', checked_ms = 0");
   run("UPDATE stored_files SET bytes = -1, sha256 = '' WHERE name = 'volumes/two'");
-  EXPECT_EQ(stored_.due(Time(1ms), Time(0ms)), "volumes/one");
+  EXPECT_EQ(stored_.due(Time(1ms), Time(0ms), {}), "volumes/one");
   EXPECT_EQ(text_of("volumes/one"), "first");
-  EXPECT_EQ(stored_.due(Time(1ms), Time(0ms)), "volumes/two");
+  EXPECT_EQ(stored_.due(Time(1ms), Time(0ms), {}), "volumes/two");
   EXPECT_TRUE(stored_.check("volumes/two"));
   EXPECT_EQ(text_of("volumes/two"), "second");
-  EXPECT_FALSE(stored_.due(Time(1ms), Time(0ms)));
+  EXPECT_FALSE(stored_.due(Time(1ms), Time(0ms), {}));
 
   run("UPDATE stored_files SET block_sums = '' WHERE name = 'volumes/one'");
   flip_bit(files_.path_of("volumes/one"), 3);
@@ -105,16 +105,17 @@ TEST_F(StoredFilesTest, SumsThatAreThemselvesDamagedAreMadeAnew) {
 TEST_F(StoredFilesTest, WhatWasCheckedLongestAgoIsDueFirstAndDamagedOnesBefore) {
   run("UPDATE stored_files SET checked_ms = 1000 WHERE name = 'volumes/one'");
   run("UPDATE stored_files SET checked_ms = 2000 WHERE name = 'volumes/two'");
-  EXPECT_FALSE(stored_.due(Time(999ms), Time(999ms)));
-  EXPECT_EQ(stored_.due(Time(5s), Time(0s)), "volumes/one");
+  EXPECT_FALSE(stored_.due(Time(999ms), Time(999ms), {}));
+  EXPECT_EQ(stored_.due(Time(5s), Time(0s), {}), "volumes/one");
+  EXPECT_EQ(stored_.due(Time(5s), Time(0s), {{"volumes/one", Time()}}), "volumes/two");
   run("UPDATE stored_files SET damaged = 1 WHERE name = 'volumes/two'");
-  EXPECT_EQ(stored_.due(Time(5s), Time(5s)), "volumes/two");
+  EXPECT_EQ(stored_.due(Time(5s), Time(5s), {}), "volumes/two");
 }
 
 TEST_F(StoredFilesTest, FilesAreForgottenWithTheirDirectory) {
   for (const char* name : {"results/j-1.1/a", "results/j-1.1/b", "results/j-1.10/a", "results/j-1.1"})
     database_.write([&](Database& database) {
-      insert_file(database, {name, 1, "", ""});
+      insert_file(database, {name, 1, "", ""}, database_.now());
       return true;
     });
   database_.write([](Database& database) {
@@ -141,6 +142,41 @@ class ScrubTest : public JobServiceTest {
 
   std::atomic<std::chrono::hours> ahead_ = 0h;
 };
+
+/// A directory in place of a file cannot be read, like a sector that has gone bad.
+TEST_F(ScrubTest, AFileThatCannotBeReadHoldsUpNoOther) {
+  open_scrubbing();
+  const auto unreadable = upload(*service_, "voxels").value(), flipped = upload(*service_, "others").value();
+  const auto folder = settings().data_dir / "volumes";
+  std::filesystem::remove(folder / unreadable.id);
+  std::filesystem::create_directory(folder / unreadable.id);
+  flip_bit(folder / flipped.id, 13);
+  ahead_ = 24h * 7 + 1h;
+  for (int tries = 0; tries < 1000 && damaged() == 0; ++tries) std::this_thread::sleep_for(10ms);
+  EXPECT_EQ(damaged(), 1);
+}
+
+/// By the same clock as all else: not again and again, when that has been turned.
+TEST_F(ScrubTest, ReadsEveryFileOnce) {
+  open_scrubbing();
+  const auto volume = upload(*service_, "voxels").value();
+  ahead_ = 24h * 7 + 1h;
+  const auto last_check = [&] {
+    Database database(settings().data_dir / "volsmooth.db", Database::Access::kReader);
+    Statement row = database.query("SELECT checked_ms FROM stored_files");
+    row.step();
+    return row.integer(0);
+  };
+  const std::int64_t stored = last_check();
+  std::int64_t first = stored;
+  for (int tries = 0; tries < 1000 && first == stored; ++tries) {
+    std::this_thread::sleep_for(10ms);
+    first = last_check();
+  }
+  EXPECT_NE(first, stored);
+  std::this_thread::sleep_for(1500ms);  // a claim a second, at the least
+  EXPECT_EQ(last_check(), first);
+}
 
 TEST_F(ScrubTest, FindsDamageThatNobodyAskedForAndItsEnd) {
   open_scrubbing();

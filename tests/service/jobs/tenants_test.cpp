@@ -109,7 +109,7 @@ TEST_F(TenantsTest, SurviveARestart) {
 /// The same series from two wards is two series.
 TEST_F(TenantsTest, WhatDevicesSendBelongsToTheirTenant) {
   auto engine = fake_.engine();
-  engine.instances = [](const auto&) -> tl::expected<std::vector<ArrivedInstance>, Problem> {
+  engine.instances = [](const auto&, const auto&) -> tl::expected<std::vector<ArrivedInstance>, Problem> {
     return std::vector<ArrivedInstance>{{"1.2", "1.2.3", "1.2.3.4", "1.2.3.4.5", 0, 1}};
   };
   Pacs pacs;
