@@ -214,7 +214,7 @@ TEST_F(Smooth, KnowsAMethodBeforeAnythingIsSent) {
   EXPECT_FALSE(server_.saw("POST /v1/volumes"));
 }
 
-TEST_F(Smooth, CancelsTheJobWhenItIsInterrupted) {
+TEST_F(Smooth, CancelsTheJobAndTakesTheVolumeAwayWhenItIsInterrupted) {
   waited_ = [] {
     kill(getpid(), SIGINT);
     return CannedAnswer{.bytes = "", .hold = true};
@@ -222,7 +222,8 @@ TEST_F(Smooth, CancelsTheJobWhenItIsInterrupted) {
   const auto outcome = run();
   ASSERT_FALSE(outcome);
   EXPECT_EQ(outcome.error().code, ExitCode::kInterrupted);
-  EXPECT_EQ(server_.seen().back().line, "POST /v1/jobs/j1/cancel");
+  EXPECT_TRUE(server_.saw("POST /v1/jobs/j1/cancel"));
+  EXPECT_EQ(server_.seen().back().line, "DELETE /v1/volumes/v1");
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
 }
 
