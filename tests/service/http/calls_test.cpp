@@ -320,6 +320,24 @@ TEST_F(Calls, ResultsHaveTagsAndRanges) {
   EXPECT_EQ(ask("GET " + path, "", "Accept: image/png\r\n").status, 406);
 }
 
+TEST_F(Calls, TheLinesOfAcceptAreOneList) {
+  const std::string file = "/v1/jobs/" + finished_job(upload()) + "/results/out.nii.gz";
+  const std::vector<std::pair<std::string, std::string>> served = {{"/v1/methods", "application/json"},
+                                                                   {file, "application/octet-stream"}};
+  for (const auto& [path, type] : served) {
+    const auto status = [&](const std::vector<std::string>& lines) {
+      std::string fields;
+      for (const auto& line : lines) fields += "Accept: " + line + "\r\n";
+      return ask("GET " + path, "", fields).status;
+    };
+    EXPECT_EQ(status({"text/html", type}), 200);
+    EXPECT_EQ(status({type, "text/html"}), 200);
+    EXPECT_EQ(status({"", type}), 200);
+    EXPECT_EQ(status({"*/*", type + ";q=0"}), 406) << "what the second line excludes";
+    EXPECT_EQ(status({"text/html", "image/png"}), 406);
+  }
+}
+
 TEST_F(Calls, SeveralRangesComeAsParts) {
   const std::string path = "/v1/jobs/" + finished_job(upload("0123456789")) + "/results/out.nii.gz";
   const auto answer = ask("GET " + path, "", "Range: bytes=0-1,-2\r\n");
