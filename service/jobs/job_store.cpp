@@ -382,7 +382,6 @@ ServiceStatistics JobStore::statistics() {
     found.queued = count(database, kCountQueued);
     found.running = count(database, "SELECT count(*) FROM jobs WHERE state = 'running'");
     found.volumes = count(database, "SELECT count(*) FROM volumes");
-    found.jobs_total = count(database, "SELECT count(*) FROM jobs");
     found.stored_bytes = count(database, "SELECT coalesce(sum(bytes), 0) FROM usage");
     found.damaged_files = count(database, "SELECT count(*) FROM stored_files WHERE damaged = 1");
     return found;
