@@ -187,7 +187,6 @@ std::vector<JobStore::Listed> JobStore::list(std::string_view tenant, const JobQ
   return database_.read([&](Database& database) {
     std::optional<std::string_view> state;
     if (query.state) state = name_of(*query.state);
-    // A condition whose value is absent holds for every row.
     // Only conditions that are there, so that each finds its index.
     std::string where = "WHERE tenant = ?6";
     if (state) where += " AND state = ?1";
