@@ -1,5 +1,7 @@
 #include "service/http/body_receiver.h"
 
+#include <algorithm>
+#include <array>
 #include <span>
 
 #include "service/http/ascii.h"
@@ -113,30 +115,48 @@ class FormBody : public BodyReceiver {
   MultipartReader reader_;
 };
 
-bool is_multipart(std::string_view content_type) {
-  return lowered(content_type).starts_with("multipart/");
-}
+constexpr std::array kJsonTypes = {BodyType{"application/json", BodyForm::kText}};
+/// DICOM files as STOW-RS sends them, in multipart/related (PS3.18, section 8.6), are kept whole, and read
+/// like any file.
+constexpr std::array kFileTypes = {BodyType{"application/octet-stream", BodyForm::kWhole},
+                                   BodyType{"multipart/related", BodyForm::kWhole},
+                                   BodyType{"multipart/form-data", BodyForm::kParts}};
+constexpr std::array kOrderTypes = {BodyType{"application/json", BodyForm::kText},
+                                    BodyType{"multipart/form-data", BodyForm::kParts}};
 
-/// DICOM files as STOW-RS sends them (PS3.18, section 8.6): the body is kept whole, and read like any file.
-bool is_related(std::string_view content_type) {
-  return lowered(split(content_type, ';').front()) == "multipart/related";
-}
-
-bool is_json(std::string_view content_type) {
-  return lowered(split(content_type, ';').front()) == "application/json";
+/// None: the kind does not take such a body.
+std::optional<BodyForm> form_of(BodyKind kind, std::string_view content_type) {
+  const auto media_type = lowered(split(content_type, ';').front());
+  const auto types = body_types(kind);
+  const auto row = std::ranges::find(types, std::string_view(media_type), &BodyType::media_type);
+  if (row != types.end()) return row->form;
+  if (kind == BodyKind::kFile && !media_type.starts_with("multipart/")) return BodyForm::kWhole;
+  return std::nullopt;
 }
 
 }  // namespace
+
+std::span<const BodyType> body_types(BodyKind kind) {
+  switch (kind) {
+    case BodyKind::kNone:
+      return {};
+    case BodyKind::kJson:
+      return kJsonTypes;
+    case BodyKind::kFile:
+      return kFileTypes;
+    case BodyKind::kOrder:
+      return kOrderTypes;
+  }
+  return {};
+}
 
 tl::expected<std::unique_ptr<BodyReceiver>, Problem> receiver_for(BodyKind kind, Request& request,
                                                                   const BodyRules& rules) {
   const Head& head = request.head;
   const auto declared = head.content_length;
   const auto type = head.header("content-type");
-  const bool takes_form = kind == BodyKind::kFile || kind == BodyKind::kOrder;
-  const bool is_related_file = kind == BodyKind::kFile && is_related(type);
-  const bool is_form = takes_form && is_multipart(type) && !is_related_file;
-  const bool is_file = is_form || kind == BodyKind::kFile;
+  const auto form = form_of(kind, type);
+  const bool is_file = kind == BodyKind::kFile || form == BodyForm::kParts;
   const auto coding = lowered(head.header("content-encoding"));
 
   if (kind != BodyKind::kNone && !declared && !head.chunked)
@@ -149,22 +169,20 @@ tl::expected<std::unique_ptr<BodyReceiver>, Problem> receiver_for(BodyKind kind,
                                                : kMaxTextBytes;
   if (declared.value_or(0) > limit) return too_large(limit);
   if (kind == BodyKind::kNone) return std::make_unique<IgnoredBody>();
-  if (!is_file) {
-    if (!is_json(type))
-      return unsupported(takes_form ? "Content-Type must be application/json or multipart/form-data."
-                                    : "Content-Type must be application/json.");
-    return std::make_unique<TextBody>(request);
-  }
-
+  if (form == BodyForm::kText) return std::make_unique<TextBody>(request);
+  if (!is_file)
+    return unsupported(kind == BodyKind::kOrder
+                           ? "Content-Type must be application/json or multipart/form-data."
+                           : "Content-Type must be application/json.");
   const auto boundary = multipart_boundary(type);
-  if (is_form && !boundary)
+  if (!form || (form == BodyForm::kParts && !boundary))
     return unsupported(
         "The multipart types here are multipart/form-data with a boundary of 1 to 70 characters and, for a "
         "volume alone, multipart/related.");
   auto file = rules.begin_upload(request.caller, declared, !head.header("idempotency-key").empty());
   if (!file) return tl::unexpected(file.error());
   request.file = std::move(*file);
-  if (is_form)
+  if (form == BodyForm::kParts)
     return std::make_unique<FormBody>(*boundary, kind == BodyKind::kOrder, request, rules.max_upload_bytes);
   return std::make_unique<WholeFileBody>(request, rules.max_upload_bytes);
 }

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <span>
 #include <string_view>
 #include <tl/expected.hpp>
 
@@ -17,6 +18,22 @@ enum class BodyKind {
   kFile,   ///< the file itself, or a multipart form with the part `volume`
   kOrder,  ///< JSON, or a multipart form with the parts `volume` (a file) and `job` (JSON)
 };
+
+/// How a body brings what it brings.
+enum class BodyForm {
+  kText,
+  kWhole,  ///< the body is the file
+  kParts,  ///< a multipart form
+};
+
+struct BodyType {
+  std::string_view media_type;
+  BodyForm form;
+};
+
+/// The media types that a kind of body comes in: `receiver_for` and the OpenAPI document both read this. Of
+/// kFile, every other type that is not a multipart is taken as application/octet-stream is.
+std::span<const BodyType> body_types(BodyKind kind);
 
 inline constexpr std::int64_t kMaxTextBytes = std::int64_t{1} << 20;
 

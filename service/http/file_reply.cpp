@@ -40,7 +40,7 @@ bool begins_whole(const FileBody& body) {
 }  // namespace
 
 Reply reply_with_file(const Request& request, const StoredFile& file) {
-  if (!accepts(request.head.header("accept"), file.media_type))
+  if (!accepts(request.head.list("accept"), file.media_type))
     return tl::unexpected(Problem{"not-acceptable", "It can only be sent as " + file.media_type + "."});
   const std::string tag = '"' + file.sha256 + '"';
   Response response{200, {{"ETag", tag}, {"Accept-Ranges", "bytes"}, {"Cache-Control", "no-store"}}};

@@ -116,6 +116,12 @@ std::string_view Head::header(std::string_view name) const {
   return field == fields.end() ? std::string_view() : field->value;
 }
 
+std::string Head::list(std::string_view name) const {
+  std::string joined;
+  for (const auto value : values_of(*this, name)) joined += (joined.empty() ? "" : ", ") + std::string(value);
+  return joined;
+}
+
 std::optional<std::size_t> head_end(std::string_view received) {
   bool first_line = true;
   for (std::size_t at = 0; at < received.size(); ++at) {

@@ -33,6 +33,8 @@ struct Head {
 
   /// The value of the first field called `name` (lower case), or nothing.
   std::string_view header(std::string_view name) const;
+  /// The values of all fields called `name` (lower case) as one list (RFC 9110, section 5.3), or nothing.
+  std::string list(std::string_view name) const;
   bool has_body() const { return chunked || content_length.value_or(0) > 0; }
 };
 

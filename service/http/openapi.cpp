@@ -24,6 +24,10 @@ json header_parameter(std::string_view name, std::string_view description) {
   return {{"name", name}, {"in", "header"}, {"description", description}, {"schema", {{"type", "string"}}}};
 }
 
+bool gives_file(const Route& route) {
+  return route.answer.media_type == "*/*";
+}
+
 json parameters_of(const Route& route) {
   json parameters = json::array();
   for (const auto part : split(route.pattern, '/'))
@@ -51,22 +55,43 @@ json parameters_of(const Route& route) {
   if (route.method == "DELETE")
     parameters.push_back(header_parameter(
         "If-Match", "The ETag that GET gave; what has changed since stays: 412 precondition-failed."));
+  if (route.answer.tagged)
+    parameters.push_back(header_parameter(
+        "If-None-Match", "ETags of what is there already, or *: 304 when it is still one of them."));
+  if (gives_file(route)) {
+    parameters.push_back(header_parameter(
+        "Range",
+        "Such as bytes=0-99,-100: 206 with up to 8 ranges, 416 range-not-satisfiable beyond the end."));
+    parameters.push_back(
+        header_parameter("If-Range", "The ETag that Range counts on; all is sent when it is another."));
+  }
+  if (route.answer.media_type == "text/event-stream")
+    parameters.push_back(
+        header_parameter("Last-Event-ID", "The id of the last event that came: only later ones are sent."));
   return parameters;
 }
 
-json body_of(const Route& route) {
+json schema_of(BodyForm form, const Route& route) {
   const json file = {{"type", "string"}, {"format", "binary"}};
-  json form = {{"type", "object"}, {"required", {"volume"}}, {"properties", {{"volume", file}}}};
-  json content;
-  if (route.body == BodyKind::kFile) {
-    content["application/octet-stream"] = {{"schema", file}};
-  } else {
-    content["application/json"] = {{"schema", schema_reference(route.body_schema)}};
-    form["required"].push_back("job");
-    form["properties"]["job"] = {{"description", "The order without `volume`, as JSON."}, {"type", "string"}};
+  if (form == BodyForm::kText) return schema_reference(route.body_schema);
+  if (form == BodyForm::kWhole) return file;
+  json parts = {{"type", "object"}, {"required", {"volume"}}, {"properties", {{"volume", file}}}};
+  if (!route.body_schema.empty()) {
+    parts["required"].push_back("job");
+    parts["properties"]["job"] = {{"description", "The order without `volume`, as JSON."},
+                                  {"type", "string"}};
   }
-  if (route.body != BodyKind::kJson) content["multipart/form-data"] = {{"schema", form}};
-  return {{"required", true}, {"content", content}};
+  return parts;
+}
+
+json body_of(const Route& route) {
+  json body = {{"required", true}};
+  if (route.body == BodyKind::kFile)
+    body["description"] =
+        "The file itself, whatever its Content-Type; DICOM files also as parts of multipart/related.";
+  for (const auto& [media_type, form] : body_types(route.body))
+    body["content"][std::string(media_type)]["schema"] = schema_of(form, route);
+  return body;
 }
 
 json responses_of(const Route& route) {
@@ -80,7 +105,14 @@ json responses_of(const Route& route) {
   if (answer.tagged) success["headers"]["ETag"]["schema"]["type"] = "string";
   json problem = {{"description", "Why not."}};
   problem["content"]["application/problem+json"]["schema"] = schema_reference("Problem");
-  return {{std::to_string(answer.status), success}, {"default", problem}};
+  json responses = {{std::to_string(answer.status), success}, {"default", problem}};
+  if (answer.tagged) responses["304"]["description"] = "It is still what If-None-Match names.";
+  if (gives_file(route)) {
+    responses["206"]["description"] = "The range that was asked for, or several as parts.";
+    for (const char* type : {"*/*", "multipart/byteranges"})
+      responses["206"]["content"][type] = json::object();
+  }
+  return responses;
 }
 
 /// Of a bearer token OpenAPI 3.1 lets the list say the roles.

@@ -59,7 +59,6 @@ constexpr auto kTypes = std::to_array<ProblemType>({
     {"unknown-algorithm", 422, "Unknown method"},
     {"unknown-field", 422, "Unknown member"},
     {"unsupported-media-type", 415, "Unsupported media type"},
-    {"upload-incomplete", 409, "The upload is not complete"},
     {"volume-in-use", 409, "The volume is in use"},
     // Uploaded files
     {"decompression-limit", 413, "The file unpacks to more than is allowed"},

@@ -153,7 +153,7 @@ tl::expected<void, Problem> Session::admit(Exchange& exchange) const {
 
   const auto media_type = exchange.route->answer.media_type;
   if (media_type.find('/') != std::string_view::npos && media_type != "*/*" &&
-      !accepts(request.head.header("accept"), media_type))
+      !accepts(request.head.list("accept"), media_type))
     return tl::unexpected(
         Problem{"not-acceptable", "The answer can only be " + std::string(media_type) + "."});
   return {};

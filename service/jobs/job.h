@@ -94,7 +94,7 @@ struct JobPlan {
 /// One file that a job made.
 struct Result {
   std::string name;  ///< such as "mean-curvature-flow_iso300.stl"
-  std::string kind;  ///< "volume", "surface", "report" or "picture"
+  std::string kind;  ///< "volume", "surface", "report", "picture", "series" or "dicom"
   std::string method;
   std::vector<double> isovalues;  ///< of a surface: one, or all of a file with many surfaces
   bool many_surfaces = false;     ///< tells a list of one isovalue from a number

@@ -85,7 +85,7 @@ struct StoredFile {
 };
 
 struct ServiceStatistics {
-  std::int64_t queued = 0, running = 0, volumes = 0, jobs_total = 0, stored_bytes = 0, free_disk_bytes = 0;
+  std::int64_t queued = 0, running = 0, volumes = 0, stored_bytes = 0, free_disk_bytes = 0;
   std::int64_t damaged_files = 0;
 };
 

@@ -189,7 +189,6 @@ std::vector<JobStore::Listed> JobStore::list(std::string_view tenant, const JobQ
   return database_.read([&](Database& database) {
     std::optional<std::string_view> state;
     if (query.state) state = name_of(*query.state);
-    // A condition whose value is absent holds for every row.
     // Only conditions that are there, so that each finds its index.
     std::string where = "WHERE tenant = ?6";
     if (state) where += " AND state = ?1";
@@ -384,7 +383,6 @@ ServiceStatistics JobStore::statistics() {
     found.queued = count(database, kCountQueued);
     found.running = count(database, "SELECT count(*) FROM jobs WHERE state = 'running'");
     found.volumes = count(database, "SELECT count(*) FROM volumes");
-    found.jobs_total = count(database, "SELECT count(*) FROM jobs");
     found.stored_bytes = count(database, "SELECT coalesce(sum(bytes), 0) FROM usage");
     found.damaged_files = count(database, "SELECT count(*) FROM stored_files WHERE damaged = 1");
     return found;

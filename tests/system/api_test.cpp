@@ -294,6 +294,55 @@ TEST_F(Api, MetricsAndHealth) {
   EXPECT_THAT(metrics.body, HasSubstr("# TYPE volsmooth_"));
 }
 
+struct SchemaCase {
+  const char *schema, *fits, *does_not;  ///< JSON; the last two are arrays of documents
+};
+
+/// The checker itself, keyword by keyword.
+TEST(SchemaCheck, TellsWhatFitsFromWhatDoesNot) {
+  const SchemaCheck check(json::parse(R"({"components": {"schemas": {"Small": {"maximum": 3}}}})"));
+  const std::vector<SchemaCase> cases = {
+      {R"({"type": "integer"})", "[1, -2, 3.0]", R"([1.5, "1", null, true, []])"},
+      {R"({"type": ["number", "null"]})", "[1.5, 1, null]", R"(["1", false, {}])"},
+      {R"({"enum": ["a", null]})", R"(["a", null])", R"(["b", 0])"},
+      {R"({"const": "auto"})", R"(["auto"])", R"(["Auto", null, ["auto"]])"},
+      {R"({"minimum": 0, "maximum": 1})", R"([0, 0.5, 1, "2"])", "[-0.1, 1.1, 2]"},
+      {R"({"exclusiveMinimum": 0})", "[0.1, 1]", "[0, -1]"},
+      {R"({"pattern": "^[0-9a-f]{2}$"})", R"(["0f", 7])", R"(["0F", "0f0", ""])"},
+      {R"({"format": "date-time"})", R"(["2026-11-26T21:18:36Z", "2026-11-26T21:18:36.5+01:00", null])",
+       R"(["2026-11-26", "2026-13-26T21:18:36Z", "2026-11-26 21:18:36Z", "2026-11-26T21:18:36", ""])"},
+      {R"({"minItems": 1, "maxItems": 2})", R"([[1], [1, 2], "text"])", "[[], [1, 2, 3]]"},
+      {R"({"items": {"type": "string"}})", R"([[], ["a"], 1])", R"([[1], ["a", null]])"},
+      {R"({"required": ["a"]})", R"([{"a": null}, 1])", R"([{}, {"b": 1}])"},
+      {R"({"properties": {"a": {"type": "string"}}})", R"([{}, {"a": ""}, {"b": 1}])", R"([{"a": 1}])"},
+      {R"({"properties": {"a": {}}, "additionalProperties": false})", R"([{}, {"a": 1}])",
+       R"([{"b": 1}, {"a": 1, "b": 1}])"},
+      {R"({"additionalProperties": {"type": "number"}})", R"([{}, {"a": 1}])", R"([{"a": "1"}])"},
+      {R"({"anyOf": [{"const": "auto"}, {"type": "array"}]})", R"(["auto", []])", R"(["other", 1])"},
+      {R"({"anyOf": [{"type": "null"}, {"type": "string"}], "pattern": "a"})", R"([null, "a"])",
+       R"(["b", 1])"},
+      {R"({"oneOf": [{"minimum": 1}, {"minimum": 2}]})", "[1]", "[0, 2]"},
+      {R"({"$ref": "#/components/schemas/Small"})", "[3]", "[4]"},
+      {R"({"$ref": "#/components/schemas/Small", "minimum": 1})", "[1]", "[0, 4]"}};
+  for (const SchemaCase& one : cases) {
+    const json schema = json::parse(one.schema);
+    for (const json& value : json::parse(one.fits))
+      EXPECT_THAT(check.faults(value, schema), IsEmpty()) << one.schema << " " << value;
+    for (const json& value : json::parse(one.does_not))
+      EXPECT_THAT(check.faults(value, schema), testing::Not(IsEmpty())) << one.schema << " " << value;
+  }
+}
+
+TEST(SchemaCheck, RefusesWhatItDoesNotKnow) {
+  const SchemaCheck check(json::object());
+  for (const char* schema :
+       {R"({"maxLength": 3})", R"({"format": "uuid"})", R"({"items": {"maxLength": 3}})",
+        R"({"properties": {"a": {"not": {}}}})", R"({"anyOf": [{}, {"uniqueItems": true}]})"})
+    EXPECT_THROW((void)check.faults(1, json::parse(schema)), std::invalid_argument) << schema;
+  EXPECT_THROW(SchemaCheck(json::parse(R"({"components": {"schemas": {"A": {"maxLength": 3}}}})")),
+               std::invalid_argument);
+}
+
 /// Every call of the OpenAPI document, made: the answer has the documented status and satisfies its schema.
 TEST_F(Api, TheDaemonKeepsToItsOpenApiDocument) {
   const json openapi = service_.get("/openapi.json");

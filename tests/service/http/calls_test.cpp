@@ -320,6 +320,24 @@ TEST_F(Calls, ResultsHaveTagsAndRanges) {
   EXPECT_EQ(ask("GET " + path, "", "Accept: image/png\r\n").status, 406);
 }
 
+TEST_F(Calls, TheLinesOfAcceptAreOneList) {
+  const std::string file = "/v1/jobs/" + finished_job(upload()) + "/results/out.nii.gz";
+  const std::vector<std::pair<std::string, std::string>> served = {{"/v1/methods", "application/json"},
+                                                                   {file, "application/octet-stream"}};
+  for (const auto& [path, type] : served) {
+    const auto status = [&](const std::vector<std::string>& lines) {
+      std::string fields;
+      for (const auto& line : lines) fields += "Accept: " + line + "\r\n";
+      return ask("GET " + path, "", fields).status;
+    };
+    EXPECT_EQ(status({"text/html", type}), 200);
+    EXPECT_EQ(status({type, "text/html"}), 200);
+    EXPECT_EQ(status({"", type}), 200);
+    EXPECT_EQ(status({"*/*", type + ";q=0"}), 406) << "what the second line excludes";
+    EXPECT_EQ(status({"text/html", "image/png"}), 406);
+  }
+}
+
 TEST_F(Calls, SeveralRangesComeAsParts) {
   const std::string path = "/v1/jobs/" + finished_job(upload("0123456789")) + "/results/out.nii.gz";
   const auto answer = ask("GET " + path, "", "Range: bytes=0-1,-2\r\n");
@@ -419,6 +437,36 @@ TEST_F(Calls, MetricsCountByPatternAndNeverByPath) {
   EXPECT_THAT(metrics.field("content-type"), testing::StartsWith("text/plain"));
   EXPECT_THAT(metrics.body, testing::HasSubstr(R"(route="/v1/jobs/{id}",status="200"} 1)"));
   EXPECT_THAT(metrics.body, testing::Not(testing::HasSubstr(id)));
+}
+
+/// Asks every GET with a header that changes the answer wherever it counts.
+TEST_F(Calls, EveryHeaderThatAGetHeedsIsDeclared) {
+  const auto volume = upload();
+  const auto job = finished_job(volume);
+  const auto last_event = ids_in(ask("GET /v1/jobs/" + job + "/events").body).back();
+  const auto paths = openapi_document(jobs_.engine().methods).at("paths");
+  for (const auto& route : routes()) {
+    if (route.method != "GET" || route.pattern == "/metrics") continue;  // which never stay the same
+    std::string path(route.pattern);
+    if (const auto at = path.find("{id}"); at != std::string::npos)
+      path.replace(at, 4, path.starts_with("/v1/volumes") ? volume : job);
+    if (const auto at = path.find("{name}"); at != std::string::npos) path.replace(at, 6, "out.nii.gz");
+    const json& operation = paths.at(std::string(route.pattern)).at("get");
+    const auto plain = ask("GET " + path);
+    ASSERT_EQ(plain.status, 200) << path;
+    const std::vector<std::pair<std::string, std::string>> headers = {
+        {"Range", "bytes=0-1"}, {"If-None-Match", "*"}, {"Last-Event-ID", last_event}};
+    for (const auto& [name, value] : headers) {
+      const auto answer = ask("GET " + path, "", name + ": " + value + "\r\n");
+      const bool heeded = answer.status != plain.status || answer.body != plain.body;
+      const bool declared = std::ranges::any_of(operation.at("parameters"), [&](const json& one) {
+        return one.at("in") == "header" && one.at("name") == name;
+      });
+      EXPECT_EQ(declared, heeded) << path << " " << name;
+      EXPECT_TRUE(operation.at("responses").contains(std::to_string(answer.status)))
+          << path << " " << answer.status;
+    }
+  }
 }
 
 /// Holds a document to a schema: members and their names; enough of JSON Schema for ours.

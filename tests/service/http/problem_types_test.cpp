@@ -14,28 +14,41 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Every slug that a source file gives to a problem or a refusal, as it stands there.
-std::set<std::string> slugs_in_sources() {
-  static const std::regex in_code(
-      R"rx((?:Problem|refuse|refuse_dicom|Refusal|Refused)\s*[({]+\s*"([a-z][a-z0-9-]+)")rx");
+/// What the first group of `pattern` finds in the sources, without the table itself.
+std::set<std::string> found_in_sources(const std::regex& pattern) {
   const fs::path root = VOLSMOOTH_SOURCE_DIR;
-  std::set<std::string> slugs;
+  std::set<std::string> found_there;
   for (const char* part : {"service", "algorithms"})
     for (const auto& entry : fs::recursive_directory_iterator(root / part)) {
       if (entry.path().extension() != ".cpp" && entry.path().extension() != ".h") continue;
+      if (entry.path().filename() == "problem_types.cpp") continue;
       std::stringstream text;
       text << std::ifstream(entry.path()).rdbuf();
       const std::string source = text.str();
-      for (std::sregex_iterator found(source.begin(), source.end(), in_code), end; found != end; ++found)
-        slugs.insert((*found)[1]);
+      for (std::sregex_iterator found(source.begin(), source.end(), pattern), end; found != end; ++found)
+        found_there.insert((*found)[1]);
     }
-  return slugs;
+  return found_there;
 }
 
+/// The first literal of a problem or a refusal, by its name or by the sentence that follows.
+const std::regex kInAProblem(R"rx((?:(?:Problem|refuse|refuse_dicom|Refusal|Refused)\s*[({]+\s*|)rx"
+                             R"rx((?:return|failed|failure|refusal|send)\s*[({]+\s*)rx"
+                             R"rx((?="[a-z0-9-]+",\s*(?:std::string\()?"[A-Z][^" ]* )))rx"
+                             R"rx("([a-z][a-z0-9-]+)")rx");
+const std::regex kAnyLiteral(R"rx("([a-z][a-z0-9-]+)")rx");
+
 TEST(ProblemTypes, TableKnowsEverySlugThatTheSourcesUse) {
-  const auto used = slugs_in_sources();
-  ASSERT_THAT(used, testing::IsSupersetOf({"bad-header", "not-found", "nifti-bad-spacing"}));
+  const auto used = found_in_sources(kInAProblem);
+  ASSERT_THAT(used, testing::IsSupersetOf({"bad-header", "not-found", "nifti-bad-spacing", "bad-chunk",
+                                           "internal", "series-incomplete", "too-many-connections"}));
   for (const auto& slug : used) EXPECT_NO_THROW((void)problem_type(slug)) << slug;
+}
+
+TEST(ProblemTypes, TheSourcesUseEverySlugOfTheTable) {
+  const auto literals = found_in_sources(kAnyLiteral);
+  for (const auto& type : problem_types())
+    EXPECT_TRUE(literals.contains(std::string(type.slug))) << type.slug;
 }
 
 TEST(ProblemTypes, EverySlugIsThereOnceWithAnErrorStatusAndATitle) {

@@ -288,8 +288,6 @@ TEST_F(RecoveryTest, AKillAtAnyMomentLosesNothingAndDoublesNothing) {
     EXPECT_EQ(digest_of(file.path).sha256, file.sha256);
     EXPECT_EQ(file.sha256, service_->volume(kAnyone, job.order.volume)->sha256);
   }
-  const ServiceStatistics found = service_->statistics();
-  EXPECT_GE(found.jobs_total, std::ssize(jobs));
   EXPECT_GT(jobs.size(), 0u);
   service_->stop();
   std::map<std::string, int> directories;
