@@ -1,4 +1,6 @@
 #include <fcntl.h>
+#include <poll.h>
+#include <unistd.h>
 
 #include <csignal>
 #include <cstdio>
@@ -72,6 +74,15 @@ Expected<void> run(const Options& options, const Console& console) {
   return run_on(*server, false, options, console, interruption);
 }
 
+bool is_all_printed() {
+  return std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
+}
+
+bool has_reader_gone() {
+  pollfd output{STDOUT_FILENO, POLLOUT, 0};
+  return ::poll(&output, 1, 0) == 1 && (output.revents & POLLERR) != 0;
+}
+
 /// Runs it and says what went wrong; only a broken promise, such as a document without its members, is thrown
 /// here.
 ExitCode run_and_tell(const Options& options) {
@@ -85,7 +96,8 @@ ExitCode run_and_tell(const Options& options) {
   } catch (const std::exception& error) {
     outcome = fail(ExitCode::kInternal, error.what());
   }
-  if (outcome && (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)) {
+  if (outcome && !is_all_printed()) {
+    if (has_reader_gone()) return ExitCode::kCannotWrite;  // such as head, which wanted no more
     outcome = fail(ExitCode::kCannotWrite, "Standard output cannot be written.");
   }
   if (outcome) return ExitCode::kDone;
@@ -114,6 +126,5 @@ int main(int argc, char** argv) {
   if (options) return static_cast<int>(run_and_tell(*options));
   const NoCommand& end = options.error();
   std::fputs(end.text.c_str(), end.code == ExitCode::kDone ? stdout : stderr);
-  const bool told = std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
-  return static_cast<int>(told ? end.code : ExitCode::kCannotWrite);
+  return static_cast<int>(is_all_printed() ? end.code : ExitCode::kCannotWrite);
 }

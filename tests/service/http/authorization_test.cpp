@@ -159,12 +159,14 @@ TEST_F(Authorization, WhoMayOnlySubmitIsToldAJobsIdAndStateAlone) {
   const std::string id = id_of(first);
   get("/v1/jobs/" + id + "?wait=60", bearer(admin));
   for (const HttpAnswer& answer : {first, ask("POST /v1/jobs", order, bearer(submit) + fields),
-                                   ask("POST /v1/jobs/" + id + "/cancel", "", bearer(submit)),
-                                   ask("POST /v1/jobs/" + id + "/deliver", "", bearer(submit))}) {
+                                   ask("POST /v1/jobs/" + id + "/cancel", "", bearer(submit))}) {
     EXPECT_EQ(answer.status, 202);
     json document = json::parse(answer.body);
     EXPECT_TRUE(document.erase("id") == 1 && document.erase("state") == 1 && document.empty()) << answer.body;
   }
+  const HttpAnswer undelivered = ask("POST /v1/jobs/" + id + "/deliver", "", bearer(submit));
+  EXPECT_EQ(undelivered.status, 422);
+  EXPECT_THAT(undelivered.body, testing::Not(testing::HasSubstr("a name")));
   EXPECT_EQ(json::parse(ask("POST /v1/jobs/" + id + "/cancel", "", bearer(admin)).body).at("label"),
             "a name");
 }
