@@ -177,4 +177,9 @@ void write_glb(const std::filesystem::path& file, std::span<const Mesh> meshes, 
   out.close();
 }
 
+std::int64_t most_bytes_of_glb(std::int64_t vertices, std::int64_t triangles) {
+  constexpr std::int64_t kMostOfJson = 2048, kVertex = 2 * sizeof(Float3);
+  return kMostOfJson + kVertex * vertices + static_cast<std::int64_t>(sizeof(Triangle)) * triangles;
+}
+
 }  // namespace volsmooth

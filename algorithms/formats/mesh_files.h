@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <span>
 
@@ -23,6 +24,13 @@ void write_obj(const std::filesystem::path& file, std::span<const Mesh> meshes, 
 /// below it a node "iso<V>" per mesh. The meshes are in one frame. Files of 4 GiB and more do not exist in
 /// this format: std::system_error with EFBIG.
 void write_glb(const std::filesystem::path& file, std::span<const Mesh> meshes, const Progress& report);
+
+// What they take at most, each a `MeshFileSize`.
+
+std::int64_t most_bytes_of_stl(std::int64_t vertices, std::int64_t triangles);
+std::int64_t most_bytes_of_ply(std::int64_t vertices, std::int64_t triangles);
+std::int64_t most_bytes_of_obj(std::int64_t vertices, std::int64_t triangles);
+std::int64_t most_bytes_of_glb(std::int64_t vertices, std::int64_t triangles);
 
 /// Calls `write(element)` for all elements and tells `report` how far it is from time to time.
 template <typename Range, typename Write>

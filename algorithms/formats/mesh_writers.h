@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <span>
 #include <string>
@@ -14,13 +15,18 @@ namespace volsmooth {
 using MeshWriter = void (*)(const std::filesystem::path& file, std::span<const Mesh> meshes,
                             const Progress& report);
 
+/// The most bytes that a file of so many may take, for any coordinates; within a kilobyte or two for binary
+/// formats, and a third for text.
+using MeshFileSize = std::int64_t (*)(std::int64_t vertices, std::int64_t triangles);
+
 /// One row of the format table.
 struct MeshFormat {
   std::string name;        ///< "stl": also the file's extension
   std::string media_type;  ///< "model/stl"
   std::string description;
-  bool many_surfaces;  ///< one file holds all isovalues of a method, a named node each (GLB)
-  MeshWriter write;    ///< takes exactly one mesh unless `many_surfaces`
+  bool many_surfaces;       ///< one file holds all isovalues of a method, a named node each (GLB)
+  MeshWriter write;         ///< takes exactly one mesh unless `many_surfaces`
+  MeshFileSize most_bytes;  ///< of one mesh; a file with many takes no more than the sum
 };
 
 const std::vector<MeshFormat>& mesh_formats();

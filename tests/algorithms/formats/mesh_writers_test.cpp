@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <nlohmann/json.hpp>
 #include <system_error>
 
@@ -63,6 +65,32 @@ TEST_F(MeshWriters, StlHasOutwardUnitNormals) {
     const Float3& x = mesh.positions[mesh.triangles[t][0]];
     ASSERT_NEAR(norm({n[0], n[1], n[2]}), 1, 1e-6);
     ASSERT_GT(n[0] * x[0] + n[1] * x[1] + n[2] * (x[2] + 5), 0);
+  }
+}
+
+TEST_F(MeshWriters, NoFileIsLongerThanItsFormatSaysAndNoneMuchShorter) {
+  Mesh long_numbers = cut_ball(Frame::kLps, -1.0 / 3);  // every one of its numbers as long as any in text
+  for (auto* vectors : {&long_numbers.positions, &long_numbers.normals})
+    std::ranges::fill(*vectors, Float3{-1.17549435e-38F, -1.17549435e-38F, -1.17549435e-38F});
+  const Size3 size{48, 47, 46};
+  const VoxelToWorld map = centred_map(scaling(0.7, 0.8, 0.9), size);
+  const auto ball = sampled_in_world(size, map, [](const Vector3& x) { return -norm(x); });
+  const Mesh large = extract_isosurface(*ball, map, -15.25);
+  for (const MeshFormat& format : mesh_formats()) {
+    const auto most = [&](const Mesh& mesh) {
+      return format.most_bytes(std::ssize(mesh.positions), std::ssize(mesh.triangles));
+    };
+    const auto bytes = [&](std::span<const Mesh> meshes) {
+      return static_cast<std::int64_t>(std::filesystem::file_size(written(format.name, meshes)));
+    };
+    EXPECT_LE(bytes({&long_numbers, 1}), most(long_numbers)) << format.name;
+    EXPECT_GT(bytes({&long_numbers, 1}), most(long_numbers) - 2048) << format.name;
+    EXPECT_LE(bytes({&large, 1}), most(large)) << format.name;
+    EXPECT_GT(bytes({&large, 1}), most(large) * 2 / 3) << format.name;
+    const std::array three{long_numbers, large, large};
+    if (format.many_surfaces) {
+      EXPECT_LE(bytes(three), most(long_numbers) + 2 * most(large)) << format.name;
+    }
   }
 }
 
