@@ -22,8 +22,11 @@ void write_obj(const std::filesystem::path& file, std::span<const Mesh> meshes, 
 
 /// Binary glTF 2.0: a root node that scales by 0.001 and turns the frame to glTF's axes (+Y up, +Z forward),
 /// below it a node "iso<V>" per mesh. The meshes are in one frame. Files of 4 GiB and more do not exist in
-/// this format: std::system_error with EFBIG.
+/// this format: MeshFileTooLarge.
 void write_glb(const std::filesystem::path& file, std::span<const Mesh> meshes, const Progress& report);
+
+/// The length of a GLB file with so many bytes of JSON and of arrays. Throws MeshFileTooLarge.
+std::uint32_t glb_size(std::uint64_t json_bytes, std::uint64_t array_bytes);
 
 // What they take at most, each a `MeshFileSize`.
 

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -11,7 +12,15 @@
 
 namespace volsmooth {
 
-/// Writes one mesh to one file. Throws std::system_error when the file cannot be written.
+/// A file would be longer than its format can say. Thrown before any of it is written.
+class MeshFileTooLarge : public std::length_error {
+ public:
+  MeshFileTooLarge(std::uint64_t needed, std::uint64_t most)
+      : std::length_error("a mesh file beyond its format"), needed_bytes(needed), limit(most) {}
+  std::uint64_t needed_bytes, limit;
+};
+
+/// Writes one mesh to one file. Throws std::system_error when the file cannot be written, MeshFileTooLarge.
 using MeshWriter = void (*)(const std::filesystem::path& file, std::span<const Mesh> meshes,
                             const Progress& report);
 

@@ -310,6 +310,15 @@ class JobRun {
 
 }  // namespace
 
+Problem problem_of(const MeshFileTooLarge& file) {
+  const auto needed = static_cast<std::int64_t>(file.needed_bytes),
+             limit = static_cast<std::int64_t>(file.limit);
+  return {"job-too-large",
+          "The surfaces take " + gigabytes(needed) + " as a GLB file, and that format ends at " +
+              gigabytes(limit) + "; use stl or ply, or fewer isovalues.",
+          {{"estimate_bytes", needed}, {"limit_bytes", limit}}};
+}
+
 tl::expected<std::vector<Result>, Problem> run_job(const ComputeTask& task, const StageProgress& report,
                                                    const PipelineLimits& limits) {
   lower_thread_priority();
@@ -326,6 +335,8 @@ tl::expected<std::vector<Result>, Problem> run_job(const ComputeTask& task, cons
                     " of memory, and this server lets one take " + gigabytes(surface.limit) +
                     "; smooth more strongly, choose another isovalue, or crop the volume.",
                 {{"estimate_bytes", surface.needed_bytes}, {"limit_bytes", surface.limit}}});
+  } catch (const MeshFileTooLarge& file) {
+    return tl::unexpected(problem_of(file));
   } catch (const ResultsTooLarge& results) {
     return tl::unexpected(
         Problem{"job-too-large",

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <system_error>
 
+#include "algorithms/formats/mesh_files.h"
 #include "algorithms/surface/isosurface.h"
 #include "algorithms/surface/measures.h"
 #include "tests/support/mesh_checks.h"
@@ -69,9 +70,9 @@ TEST_F(MeshWriters, StlHasOutwardUnitNormals) {
 }
 
 TEST_F(MeshWriters, NoFileIsLongerThanItsFormatSaysAndNoneMuchShorter) {
-  Mesh long_numbers = cut_ball(Frame::kLps, -1.0 / 3);  // every one of its numbers as long as any in text
+  Mesh long_numbers = cut_ball(Frame::kLps, -16.0 / 3);  // every one of its numbers as long as any in text
   for (auto* vectors : {&long_numbers.positions, &long_numbers.normals})
-    std::ranges::fill(*vectors, Float3{-1.17549435e-38F, -1.17549435e-38F, -1.17549435e-38F});
+    std::ranges::fill(*vectors, Float3{-1.01000015e-36F, -1.01000015e-36F, -1.01000015e-36F});
   const Size3 size{48, 47, 46};
   const VoxelToWorld map = centred_map(scaling(0.7, 0.8, 0.9), size);
   const auto ball = sampled_in_world(size, map, [](const Vector3& x) { return -norm(x); });
@@ -92,6 +93,20 @@ TEST_F(MeshWriters, NoFileIsLongerThanItsFormatSaysAndNoneMuchShorter) {
       EXPECT_LE(bytes(three), most(long_numbers) + 2 * most(large)) << format.name;
     }
   }
+}
+
+TEST(GlbSize, EndsWithItsThirtyTwoBits) {
+  constexpr std::uint64_t kRoom =
+      0xFFFF'FFFFU - 12 - 8 - 8;  // beside the heads of the file and of two chunks
+  EXPECT_EQ(glb_size(1000, kRoom - 1000), 0xFFFF'FFFFU);
+  try {
+    glb_size(1000, kRoom - 999);
+    FAIL() << "not refused";
+  } catch (const MeshFileTooLarge& refused) {
+    EXPECT_EQ(refused.needed_bytes, std::uint64_t{1} << 32);
+    EXPECT_EQ(refused.limit, 0xFFFF'FFFFU);
+  }
+  EXPECT_EQ(glb_size(0, 0), 28U);
 }
 
 TEST_F(MeshWriters, PlyHoldsTheMesh) {

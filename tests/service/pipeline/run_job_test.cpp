@@ -14,6 +14,7 @@
 #include "algorithms/surface/otsu.h"
 #include "algorithms/volume/parallel.h"
 #include "service/pipeline/pipeline.h"
+#include "service/pipeline/stages.h"
 #include "tests/support/mesh_checks.h"
 #include "tests/support/nifti_maker.h"
 #include "tests/support/scratch_folder.h"
@@ -250,6 +251,15 @@ TEST_F(RunJob, ASurfaceThatWouldNotFitEndsTheJobWithBothNumbers) {
   ASSERT_FALSE(results);
   EXPECT_EQ(results.error().slug, "job-too-large");
   EXPECT_GT(results.error().members.at("estimate_bytes"), results.error().members.at("limit_bytes"));
+}
+
+TEST(MeshFile, ThatItsFormatCannotHoldIsTheOrdersFault) {
+  const Problem problem = problem_of(MeshFileTooLarge(std::uint64_t{5} << 30, 0xFFFF'FFFFU));
+  EXPECT_EQ(problem.slug, "job-too-large");
+  EXPECT_THAT(problem.detail, HasSubstr("5.37 GB"));
+  EXPECT_THAT(problem.detail, HasSubstr("use stl or ply, or fewer isovalues"));
+  EXPECT_EQ(problem.members.at("estimate_bytes"), std::int64_t{5} << 30);
+  EXPECT_EQ(problem.members.at("limit_bytes"), 0xFFFF'FFFFU);
 }
 
 /// Half of the voxels inside, at random: 1.5 vertices a voxel.
