@@ -8,15 +8,10 @@
 #include "algorithms/flows/upwind_metric.h"
 
 namespace volsmooth {
-namespace {
-
-constexpr double kLargestSpeed = 1.0 / 8;  ///< of w, and so of c
-
-}  // namespace
 
 SharpeningPlan plan(const Sharpening& sharpening, const Grid& grid) {
-  const StepPlan steps = plan_steps(sharpening.reach_mm / kLargestSpeed,
-                                    1 / (2 * kLargestSpeed * largest_upwind_gradient(grid)));
+  const StepPlan steps = plan_steps(sharpening.reach_mm / kLargestSharpeningSpeed,
+                                    1 / (2 * kLargestSharpeningSpeed * largest_upwind_gradient(grid)));
   return {.step_mm = steps.step_mm2, .steps = steps.steps};
 }
 
@@ -29,7 +24,8 @@ void smooth(Volume& density, const Sharpening& sharpening, const Progress& repor
       density, steps.steps,
       [&](std::span<const float> from, std::span<float> to, const Progress& report_step) {
         const auto silent = [&](double) { report_step(0); };
-        if (!balance) balance.emplace(mass_of(from, silent), kTolerance, static_cast<float>(kLargestSpeed));
+        if (!balance)
+          balance.emplace(mass_of(from, silent), kTolerance, static_cast<float>(kLargestSharpeningSpeed));
         balance->take(
             [&](float constant, const Progress& report_call) {
               return sharpening_step(from, to, grid, steps.step_mm, constant, report_call);
