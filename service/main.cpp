@@ -355,9 +355,9 @@ int run(int argc, char** argv) {
   if (audit.asked()) return guarded([&] { return audit.run(options.jobs.data_dir); });
   if (commands.asked()) return guarded([&] { return commands.run(options.jobs.data_dir); });
   options.server.max_upload_bytes = options.jobs.max_upload_bytes;
-  // The memory is said once, for the single job as for all that run together.
   options.jobs.keep = std::chrono::days(options.keep_days);
   options.jobs.scrub_period = std::chrono::days(options.scrub_days);
+  // The memory is said once, for the single job as for all that run together.
   options.jobs = completed(std::move(options.jobs));
   options.server.max_connections =
       std::min(options.server.max_connections, connections_for(raise_open_files()));

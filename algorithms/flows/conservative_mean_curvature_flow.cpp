@@ -1,10 +1,9 @@
 #include "algorithms/flows/conservative_mean_curvature_flow.h"
 
 #include <cmath>
-#include <optional>
 
+#include "algorithms/flows/balanced_steps.h"
 #include "algorithms/flows/conservative_sweep.h"
-#include "algorithms/flows/explicit_steps.h"
 #include "algorithms/flows/grid_metric.h"
 #include "algorithms/flows/mean_curvature_flow.h"
 
@@ -23,20 +22,12 @@ double largest_speed(const Grid& grid) {
 }
 
 void smooth(Volume& volume, const ConservativeMeanCurvatureFlow& flow, const Progress& report) {
-  constexpr double kTolerance = 1e-8;
   const Grid grid = grid_of(volume);
   const StepPlan steps = plan(flow, grid);
-  std::optional<MassBalance<float>> balance;
-  take_steps(
-      volume, steps.steps,
-      [&](std::span<const float> from, std::span<float> to, const Progress& report_step) {
-        const auto silent = [&](double) { report_step(0); };
-        if (!balance) balance.emplace(mass_of(from, silent), kTolerance, largest_speed(grid));
-        balance->take(
-            [&](float constant, const Progress& report_call) {
-              return balanced_step(from, to, grid, steps.step_mm2, constant, report_call);
-            },
-            report_step);
+  take_balanced_steps(
+      volume, steps.steps, largest_speed(grid),
+      [&](std::span<const float> from, std::span<float> to, float constant, const Progress& report_step) {
+        return balanced_step(from, to, grid, steps.step_mm2, constant, report_step);
       },
       report);
 }

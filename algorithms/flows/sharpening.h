@@ -7,6 +7,8 @@
 
 namespace volsmooth {
 
+inline constexpr double kLargestSharpeningSpeed = 1.0 / 8;  ///< of w, and so of c
+
 /// d rho / dt = (w - c) |grad rho|, w = (rho - 1/2)^3 where the density does not jump yet: isosurfaces gather
 /// around that of 1/2, by one constant c(t) such that the mass does not change (thesis, section 6.3,
 /// Eq. 6.8). What a soft edge of a curved surface lacks in volume comes back: sharp, the volume is the mass.

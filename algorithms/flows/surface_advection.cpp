@@ -16,8 +16,8 @@ constexpr std::int64_t kStepsOfWidth = 8;
 
 /// One step of sharpening at the largest stable size.
 void sharpen_once(MassKeepingBand& kept, const Grid& grid, const Progress& report) {
-  constexpr double kFar = 1e6, kLargestSpeed = 1.0 / 8;
-  MassBalance<float> balance = kept.balance(kLargestSpeed);
+  constexpr double kFar = 1e6;
+  MassBalance<float> balance = kept.balance(kLargestSharpeningSpeed);
   kept.take(balance, sharpening_band_step(grid, plan(Sharpening{kFar * unit_of(grid)}, grid).step_mm),
             report);
 }

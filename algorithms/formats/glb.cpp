@@ -1,10 +1,8 @@
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <initializer_list>
 #include <limits>
 #include <string>
-#include <system_error>
 
 #include "algorithms/formats/buffered_file.h"
 #include "algorithms/formats/mesh_files.h"
@@ -151,15 +149,19 @@ std::string json_of(std::span<const Mesh> meshes) {
 
 }  // namespace
 
+std::uint32_t glb_size(std::uint64_t json_bytes, std::uint64_t array_bytes) {
+  constexpr std::uint64_t kMost = std::numeric_limits<std::uint32_t>::max();
+  const std::uint64_t total = kHeaderSize + kChunkHeaderSize + json_bytes + kChunkHeaderSize + array_bytes;
+  if (total > kMost) throw MeshFileTooLarge(total, kMost);
+  return static_cast<std::uint32_t>(total);
+}
+
 void write_glb(const std::filesystem::path& file, std::span<const Mesh> meshes, const Progress& report) {
   const std::string json = json_of(meshes);
   const std::uint64_t binary = buffer_size(meshes);  // a multiple of 4
-  const std::uint64_t total = kHeaderSize + kChunkHeaderSize + json.size() + kChunkHeaderSize + binary;
-  if (total > std::numeric_limits<std::uint32_t>::max()) {
-    throw std::system_error(EFBIG, std::generic_category(), "a GLB file holds less than 4 GiB");
-  }
+  const std::uint32_t total = glb_size(json.size(), binary);
   BufferedFile out(file);
-  out.value(std::array{kMagic, kVersion, static_cast<std::uint32_t>(total)});
+  out.value(std::array{kMagic, kVersion, total});
   out.value(std::array{static_cast<std::uint32_t>(json.size()), kJsonChunk});
   out.text(json);
   out.value(std::array{static_cast<std::uint32_t>(binary), kBinaryChunk});
@@ -175,6 +177,11 @@ void write_glb(const std::filesystem::path& file, std::span<const Mesh> meshes, 
     for_each_reported(meshes[k].triangles, write, part(2. / 3));
   }
   out.close();
+}
+
+std::int64_t most_bytes_of_glb(std::int64_t vertices, std::int64_t triangles) {
+  constexpr std::int64_t kMostOfJson = 2048, kVertex = 2 * sizeof(Float3);
+  return kMostOfJson + kVertex * vertices + static_cast<std::int64_t>(sizeof(Triangle)) * triangles;
 }
 
 }  // namespace volsmooth

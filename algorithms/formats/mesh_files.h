@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <span>
 
@@ -21,8 +22,18 @@ void write_obj(const std::filesystem::path& file, std::span<const Mesh> meshes, 
 
 /// Binary glTF 2.0: a root node that scales by 0.001 and turns the frame to glTF's axes (+Y up, +Z forward),
 /// below it a node "iso<V>" per mesh. The meshes are in one frame. Files of 4 GiB and more do not exist in
-/// this format: std::system_error with EFBIG.
+/// this format: MeshFileTooLarge.
 void write_glb(const std::filesystem::path& file, std::span<const Mesh> meshes, const Progress& report);
+
+/// The length of a GLB file with so many bytes of JSON and of arrays. Throws MeshFileTooLarge.
+std::uint32_t glb_size(std::uint64_t json_bytes, std::uint64_t array_bytes);
+
+// What they take at most, each a `MeshFileSize`.
+
+std::int64_t most_bytes_of_stl(std::int64_t vertices, std::int64_t triangles);
+std::int64_t most_bytes_of_ply(std::int64_t vertices, std::int64_t triangles);
+std::int64_t most_bytes_of_obj(std::int64_t vertices, std::int64_t triangles);
+std::int64_t most_bytes_of_glb(std::int64_t vertices, std::int64_t triangles);
 
 /// Calls `write(element)` for all elements and tells `report` how far it is from time to time.
 template <typename Range, typename Write>

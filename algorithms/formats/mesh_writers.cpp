@@ -11,11 +11,13 @@ namespace volsmooth {
 
 const std::vector<MeshFormat>& mesh_formats() {
   static const std::vector<MeshFormat> formats{
-      {"stl", "model/stl", "STL, binary: triangles for printing and planning", false, write_stl},
-      {"ply", "model/ply", "PLY, binary: vertices with normals", false, write_ply},
-      {"obj", "model/obj", "Wavefront OBJ, text: vertices with normals", false, write_obj},
+      {"stl", "model/stl", "STL, binary: triangles for printing and planning", false, write_stl,
+       most_bytes_of_stl},
+      {"ply", "model/ply", "PLY, binary: vertices with normals", false, write_ply, most_bytes_of_ply},
+      {"obj", "model/obj", "Wavefront OBJ, text: vertices with normals", false, write_obj, most_bytes_of_obj},
       {"glb", "model/gltf-binary",
-       "glTF 2.0, binary: all surfaces of a method in one scene, a named node each", true, write_glb},
+       "glTF 2.0, binary: all surfaces of a method in one scene, a named node each", true, write_glb,
+       most_bytes_of_glb},
   };
   return formats;
 }

@@ -1,3 +1,5 @@
+#include <string>
+
 #include "algorithms/formats/buffered_file.h"
 #include "algorithms/formats/mesh_files.h"
 #include "algorithms/formats/mesh_writers.h"
@@ -39,6 +41,14 @@ void write_obj(const std::filesystem::path& file, std::span<const Mesh> meshes, 
       },
       part_of(report, 0.7, 1));
   out.close();
+}
+
+std::int64_t most_bytes_of_obj(std::int64_t vertices, std::int64_t triangles) {
+  constexpr std::int64_t kMostOfHead = 512, kMostOfFloat = 15;  // "-1.01000015e-36"
+  constexpr std::int64_t kVector = 3 * (1 + kMostOfFloat) + 1;  // behind its keyword
+  const auto digits = static_cast<std::int64_t>(std::to_string(vertices).size());
+  const std::int64_t face = 1 + 3 * (1 + digits + 2 + digits) + 1;
+  return kMostOfHead + (1 + kVector + 2 + kVector) * vertices + face * triangles;
 }
 
 }  // namespace volsmooth

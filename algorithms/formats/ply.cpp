@@ -38,4 +38,9 @@ void write_ply(const std::filesystem::path& file, std::span<const Mesh> meshes, 
   out.close();
 }
 
+std::int64_t most_bytes_of_ply(std::int64_t vertices, std::int64_t triangles) {
+  constexpr std::int64_t kMostOfHead = 512, kVertex = 2 * sizeof(Float3), kFace = 1 + sizeof(Triangle);
+  return kMostOfHead + kVertex * vertices + kFace * triangles;
+}
+
 }  // namespace volsmooth

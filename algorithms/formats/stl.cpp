@@ -44,4 +44,9 @@ void write_stl(const std::filesystem::path& file, std::span<const Mesh> meshes, 
   out.close();
 }
 
+std::int64_t most_bytes_of_stl(std::int64_t /*vertices*/, std::int64_t triangles) {
+  return static_cast<std::int64_t>(kHeaderSize + sizeof(std::uint32_t)) +
+         static_cast<std::int64_t>(sizeof(Facet)) * triangles;
+}
+
 }  // namespace volsmooth

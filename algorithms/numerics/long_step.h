@@ -44,7 +44,7 @@ class LongStep {
   static constexpr int kLeastStages = 2;
 
   LongStep(int stages, double steps)
-      : stages_(stages), steps_(steps), bend_(1 - 1 / steps), w0_(shift(stages)), chebyshev_(stages, w0_) {
+      : steps_(steps), bend_(1 - 1 / steps), w0_(shift(stages)), chebyshev_(stages, w0_) {
     const auto s = static_cast<std::size_t>(stages);
     w1_ = bend_ * chebyshev_.slope[s] / chebyshev_.bend[s];
   }
@@ -57,8 +57,6 @@ class LongStep {
     const Chebyshev chebyshev(stages, w0);
     return 1 + (1 + w0) * chebyshev.bend[s] / (chebyshev.slope[s] * stiffness);
   }
-
-  int stages() const { return stages_; }
 
   /// Of stage 1 .. `stages`; the first has no stage before it but the start.
   StageWeights<double> weights(int stage) const {
@@ -102,7 +100,6 @@ class LongStep {
     return chebyshev_.bend[n] / (chebyshev_.slope[n] * chebyshev_.slope[n]) / bend_;
   }
 
-  int stages_;
   double steps_, bend_, w0_, w1_ = 0;
   Chebyshev chebyshev_;
 };

@@ -12,7 +12,7 @@ namespace volsmooth {
 template <class Scalar>
 using InverseMetric = std::array<std::array<Scalar, 3>, 3>;
 
-/// grad rho, by central differences; at the voxel that `at` leads to.
+/// grad rho, by central differences.
 template <class Scalar, class Rho>
 VOLSMOOTH_FORMULA std::array<Scalar, 3> central_gradient(const Rho& rho) {
   std::array<Scalar, 3> gradient{};

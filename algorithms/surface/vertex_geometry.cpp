@@ -120,10 +120,10 @@ SurfaceVertex VertexGeometry::on_border(const Size3& voxel) const {
   Vector3 index, outward{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     index[axis] = static_cast<double>(voxel[axis]);
-    const double thickness =
-        std::sqrt(inverse_metric_[axis][axis]);  // makes every cap's normal count the same
-    if (voxel[axis] == 0) outward[axis] = -1 / thickness;
-    if (voxel[axis] == size_[axis] - 1) outward[axis] = 1 / thickness;
+    // Of the covector of this axis: divided by it, every cap's normal counts the same.
+    const double length = std::sqrt(inverse_metric_[axis][axis]);
+    if (voxel[axis] == 0) outward[axis] = -1 / length;
+    if (voxel[axis] == size_[axis] - 1) outward[axis] = 1 / length;
   }
   return {position(index), unit_normal({-outward[0], -outward[1], -outward[2]}), 0.0F};
 }

@@ -4,10 +4,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <cerrno>
 #include <string>
 
 #include "service/process/check.h"
+#include "service/process/write_all.h"
 
 namespace volsmooth {
 namespace {
@@ -58,12 +58,7 @@ IngestCall open_call(Json options) {
 }
 
 void write_output(std::span<const std::byte> bytes) {
-  while (!bytes.empty()) {
-    const ssize_t written = ::write(kOutputDescriptor, bytes.data(), bytes.size());
-    if (written < 0 && errno == EINTR) continue;
-    check(written > 0, "writing the output");
-    bytes = bytes.subspan(static_cast<std::size_t>(written));
-  }
+  write_all(kOutputDescriptor, bytes, "writing the output");
 }
 
 Json answer_of(const Refusal& refusal) {

@@ -6,7 +6,6 @@
 #include <unistd.h>
 
 #include <array>
-#include <cerrno>
 #include <chrono>
 #include <cstdio>
 #include <ctime>
@@ -17,6 +16,7 @@
 #include "service/pipeline/dicom_reading.h"
 #include "service/pipeline/ingest_child.h"
 #include "service/process/check.h"
+#include "service/process/write_all.h"
 
 namespace volsmooth {
 namespace {
@@ -58,20 +58,9 @@ std::string described(const std::string& method, const ParameterValues& paramete
   return text.substr(0, 1024);
 }
 
-void append(const Descriptor& file, const void* bytes, std::size_t count) {
-  const char* next = static_cast<const char*>(bytes);
-  while (count > 0) {
-    const ssize_t written = ::write(file.get(), next, count);
-    if (written < 0 && errno == EINTR) continue;
-    check(written > 0, "the input for volsmooth-ingest");
-    next += written;
-    count -= static_cast<std::size_t>(written);
-  }
-}
-
-template <class T>
-void append(const Descriptor& file, const std::vector<T>& values) {
-  append(file, values.data(), values.size() * sizeof(T));
+template <class Range>
+void append(const Descriptor& file, const Range& values) {
+  write_all(file.get(), std::as_bytes(std::span(values)), "the input for volsmooth-ingest");
 }
 
 std::int64_t size_of(int descriptor) {
@@ -120,7 +109,7 @@ std::int64_t DicomResults::write_series(const std::filesystem::path& file, const
   check(::ftruncate(input.get(), static_cast<off_t>(voxels.size_bytes())) == 0 &&
             ::lseek(input.get(), 0, SEEK_SET) == 0,
         "the input for volsmooth-ingest");
-  append(input, voxels.data(), voxels.size_bytes());
+  append(input, voxels);
   const Json options = begin_object("dicom-series", random_seed());
   return derive(file, options, input.get(), report).at("clipped_voxels").get<std::int64_t>();
 }

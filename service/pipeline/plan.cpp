@@ -3,9 +3,9 @@
 #include <cstdio>
 
 #include "algorithms/formats/mesh_writers.h"
-#include "algorithms/formats/voxel_type.h"
 #include "service/pipeline/costs.h"
 #include "service/pipeline/parts.h"
+#include "service/pipeline/results_size.h"
 #include "service/pipeline/stages.h"
 
 namespace volsmooth {
@@ -18,7 +18,7 @@ constexpr double kBytesPerVoxelOfVolume = sizeof(float);
 constexpr double kBytesPerVertex = 54, kBytesPerVertexOfSearch = 90;
 
 /// As many as noisy volumes of up to 256^3 have; beyond, a surface grows with the area. What really comes out
-/// is held to the job's limit when it is counted (run_job.cpp).
+/// is held to the job's limit of memory when it is counted (run_job.cpp).
 double vertices_per_voxel(double voxels) {
   return 0.1 * std::min(1.0, 256 / std::cbrt(voxels));
 }
@@ -96,27 +96,6 @@ tl::expected<void, Problem> check_outputs(const JobOrder& order, const VolumeFac
               {{"member", "outputs"}}});
 }
 
-double bytes_of_voxel(const std::string& voxel_type) {
-  const VoxelType* type = find_voxel_type(voxel_type);
-  return type == nullptr ? sizeof(float) : static_cast<double>(type->bytes);
-}
-
-/// Results that nothing compresses, as noise: volumes as they are, 100 bytes for a vertex and its two
-/// triangles in any mesh format, of the original as well when methods are compared.
-std::int64_t disk_bytes(const JobOrder& order, const VolumeFacts& volume, double parts, double surfaces) {
-  constexpr double kSlack = 1.02, kBytesOfMeshPerVertex = 110, kOther = 8 << 20;
-  const auto voxels = static_cast<double>(voxel_count(volume.size));
-  const auto wanted = [&](std::string_view output) { return std::ranges::count(order.outputs, output) > 0; };
-  const double bytes_per_voxel = order.voxel_type == "float32" ? 4 : bytes_of_voxel(volume.voxel_type);
-  const double series = wanted("dicom-series") ? 4 : 0, nifti = wanted("nifti") ? bytes_per_voxel : 0;
-  const double meshes = static_cast<double>(order.mesh_formats.size()) + (wanted("dicom-stl") ? 1 : 0) +
-                        (wanted("dicom-obj") ? 1 : 0) + (wanted("dicom-surface-segmentation") ? 1 : 0);
-  const double vertices = vertices_per_voxel(voxels) * voxels * surfaces;
-  const double of_volumes = (nifti + series) * voxels * parts;
-  const double of_meshes = kBytesOfMeshPerVertex * vertices * meshes * (parts > 1 ? parts + 1 : 1);
-  return static_cast<std::int64_t>(kSlack * (of_volumes + of_meshes) + kOther);
-}
-
 }  // namespace
 
 std::string gigabytes(std::int64_t bytes) {
@@ -172,7 +151,7 @@ tl::expected<JobPlan, Problem> plan_job(const JobOrder& order, const VolumeFacts
                     "; crop or coarsen the volume, ask for fewer isovalues, or for a larger limit.",
                 {{"estimate_bytes", plan.memory_bytes}, {"limit_bytes", limits.max_memory_bytes}}});
   }
-  plan.disk_bytes = disk_bytes(order, volume, static_cast<double>(parts.size()), surfaces);
+  plan.disk_bytes = held_for_results(order, volume, parts.size(), static_cast<std::size_t>(surfaces)).all;
   plan.is_long = total_cost(parts, surfaces, input.grid) > kSecondsOfShortJob;
   return plan;
 }

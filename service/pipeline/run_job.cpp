@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <fstream>
+#include <functional>
 #include <system_error>
 #include <utility>
 
@@ -13,6 +14,7 @@
 #include "service/pipeline/parts.h"
 #include "service/pipeline/reading.h"
 #include "service/pipeline/report.h"
+#include "service/pipeline/results_size.h"
 #include "service/pipeline/stage_clock.h"
 #include "service/pipeline/stages.h"
 
@@ -29,6 +31,9 @@ class JobRun {
         parts_(parts_of(task.order, task.parameters, input_of(task.volume.facts))),
         limits_(limits),
         surface_bytes_(limits.max_memory_bytes / 4),
+        held_(held_for_results(task.order, task.volume.facts, parts_.size(),
+                               task.order.isovalues ? task.order.isovalues->size() : 1)),
+        parts_to_come_(parts_.size()),
         dicom_(task, limits),
         voxels_(static_cast<double>(voxel_count(task.volume.facts.size))),
         clock_(
@@ -101,6 +106,7 @@ class JobRun {
 
   void run_part(const Part& part) {
     const std::string& name = part.method->info.name;
+    --parts_to_come_;
     const Volume::Pointer volume = volume_for(part);
     dicom_.begin_method(name, part.parameters);
     FoliationRow foliation{name, part.parameters, original_foliation_, {}, {}, {}};
@@ -169,12 +175,18 @@ class JobRun {
       for (const std::string format : {"stl", "obj"}) {
         if (!wanted("dicom-" + format)) continue;
         for (const Mesh& surface : surfaces) {
+          make_room_for(std::span(&surface, 1), [&](std::int64_t vertices, std::int64_t triangles) {
+            return most_bytes_of_dicom("dicom-" + format, vertices, triangles);
+          });
           const std::string suffix = "_iso" + isovalue_text(surface.isovalue) + "_" + format + ".dcm";
           const auto file = new_dicom_result(method + suffix, method, std::span(&surface, 1));
           dicom_.write_mesh(file, format, surface, progress);
         }
       }
       if (wanted("dicom-surface-segmentation")) {
+        make_room_for(surfaces, [&](std::int64_t vertices, std::int64_t triangles) {
+          return most_bytes_of_dicom("dicom-surface-segmentation", vertices, triangles);
+        });
         const auto file = new_dicom_result(method + "_surfaces.dcm", method, surfaces);
         results_.back().many_surfaces = true;
         dicom_.write_segmentation(file, surfaces, progress);
@@ -226,6 +238,7 @@ class JobRun {
       for (const Mesh& surface : surfaces) files.emplace_back(&surface, 1);
     }
     for (const std::span<const Mesh> meshes : files) {
+      make_room_for(meshes, format.most_bytes);
       std::vector<double> isovalues;
       for (const Mesh& mesh : meshes) isovalues.push_back(mesh.isovalue);
       const std::string suffix = format.many_surfaces ? "" : "_iso" + isovalue_text(isovalues.front());
@@ -236,6 +249,17 @@ class JobRun {
       result.frame = name_of(meshes.front().frame);
       format.write(file, meshes, progress);
     }
+  }
+
+  /// Throws ResultsTooLarge when a file of `meshes` would leave less than the rest of the results may take.
+  void make_room_for(std::span<const Mesh> meshes,
+                     const std::function<std::int64_t(std::int64_t, std::int64_t)>& most_bytes) const {
+    std::int64_t needed = static_cast<std::int64_t>(parts_to_come_) * held_.beside_surfaces;
+    for (const Result& result : results_)
+      needed += static_cast<std::int64_t>(std::filesystem::file_size(task_.output_dir / result.name));
+    for (const Mesh& mesh : meshes)
+      needed += most_bytes(std::ssize(mesh.positions), std::ssize(mesh.triangles));
+    if (needed > held_.all) throw ResultsTooLarge(needed, held_.all);
   }
 
   std::filesystem::path new_result(const std::string& name, const char* kind, const std::string& method,
@@ -265,6 +289,8 @@ class JobRun {
   const PipelineLimits& limits_;
   const std::int64_t
       surface_bytes_;  ///< that one surface may take: its job holds it, the original's and a grid to search
+  const ResultsSize held_;
+  std::size_t parts_to_come_;  ///< that have written nothing yet
   DicomResults dicom_;
   const double voxels_;
   StageClock clock_;
@@ -284,6 +310,15 @@ class JobRun {
 
 }  // namespace
 
+Problem problem_of(const MeshFileTooLarge& file) {
+  const auto needed = static_cast<std::int64_t>(file.needed_bytes),
+             limit = static_cast<std::int64_t>(file.limit);
+  return {"job-too-large",
+          "The surfaces take " + gigabytes(needed) + " as a GLB file, and that format ends at " +
+              gigabytes(limit) + "; use stl or ply, or fewer isovalues.",
+          {{"estimate_bytes", needed}, {"limit_bytes", limit}}};
+}
+
 tl::expected<std::vector<Result>, Problem> run_job(const ComputeTask& task, const StageProgress& report,
                                                    const PipelineLimits& limits) {
   lower_thread_priority();
@@ -300,6 +335,16 @@ tl::expected<std::vector<Result>, Problem> run_job(const ComputeTask& task, cons
                     " of memory, and this server lets one take " + gigabytes(surface.limit) +
                     "; smooth more strongly, choose another isovalue, or crop the volume.",
                 {{"estimate_bytes", surface.needed_bytes}, {"limit_bytes", surface.limit}}});
+  } catch (const MeshFileTooLarge& file) {
+    return tl::unexpected(problem_of(file));
+  } catch (const ResultsTooLarge& results) {
+    return tl::unexpected(
+        Problem{"job-too-large",
+                "The surfaces are so rough that the results need " + gigabytes(results.needed_bytes) +
+                    " of the disk or more, and " + gigabytes(results.limit) +
+                    " is held back for them; smooth more strongly, ask for fewer formats or isovalues or for "
+                    "others, or crop the volume.",
+                {{"estimate_bytes", results.needed_bytes}, {"limit_bytes", results.limit}}});
   }
   return outcome;
 }

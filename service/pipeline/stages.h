@@ -4,6 +4,7 @@
 #include <tl/expected.hpp>
 #include <vector>
 
+#include "algorithms/formats/mesh_writers.h"
 #include "service/jobs/job.h"
 #include "service/pipeline/pipeline.h"
 
@@ -17,6 +18,9 @@ tl::expected<JobPlan, Problem> plan_job(const JobOrder& order, const VolumeFacts
                                         const PipelineLimits& limits);
 tl::expected<std::vector<Result>, Problem> run_job(const ComputeTask& task, const StageProgress& report,
                                                    const PipelineLimits& limits);
+
+/// What a job ends with whose surfaces are too much for the format asked for.
+Problem problem_of(const MeshFileTooLarge& file);
 
 /// As a sentence says it: "11.6 GB".
 std::string gigabytes(std::int64_t bytes);

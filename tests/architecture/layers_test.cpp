@@ -41,7 +41,7 @@ const std::map<std::string, std::vector<std::string>> kMayInclude = {
       "algorithms/"}},
     {"service/ingest",
      {"algorithms/formats/", "algorithms/volume/geometry.h", "algorithms/surface/mesh.h",
-      "service/process/confinement.h", "service/process/check.h"}},
+      "service/process/confinement.h", "service/process/check.h", "service/process/write_all.h"}},
     {"service/dimse", {"service/process/confinement.h"}},
     {"service/pacs",
      {"service/jobs/", "service/storage/incoming_file.h", "service/storage/posix.h", "service/process/",

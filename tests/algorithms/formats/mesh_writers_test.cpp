@@ -4,9 +4,12 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <nlohmann/json.hpp>
 #include <system_error>
 
+#include "algorithms/formats/mesh_files.h"
 #include "algorithms/surface/isosurface.h"
 #include "algorithms/surface/measures.h"
 #include "tests/support/mesh_checks.h"
@@ -64,6 +67,46 @@ TEST_F(MeshWriters, StlHasOutwardUnitNormals) {
     ASSERT_NEAR(norm({n[0], n[1], n[2]}), 1, 1e-6);
     ASSERT_GT(n[0] * x[0] + n[1] * x[1] + n[2] * (x[2] + 5), 0);
   }
+}
+
+TEST_F(MeshWriters, NoFileIsLongerThanItsFormatSaysAndNoneMuchShorter) {
+  Mesh long_numbers = cut_ball(Frame::kLps, -16.0 / 3);  // every one of its numbers as long as any in text
+  for (auto* vectors : {&long_numbers.positions, &long_numbers.normals})
+    std::ranges::fill(*vectors, Float3{-1.01000015e-36F, -1.01000015e-36F, -1.01000015e-36F});
+  const Size3 size{48, 47, 46};
+  const VoxelToWorld map = centred_map(scaling(0.7, 0.8, 0.9), size);
+  const auto ball = sampled_in_world(size, map, [](const Vector3& x) { return -norm(x); });
+  const Mesh large = extract_isosurface(*ball, map, -15.25);
+  for (const MeshFormat& format : mesh_formats()) {
+    const auto most = [&](const Mesh& mesh) {
+      return format.most_bytes(std::ssize(mesh.positions), std::ssize(mesh.triangles));
+    };
+    const auto bytes = [&](std::span<const Mesh> meshes) {
+      return static_cast<std::int64_t>(std::filesystem::file_size(written(format.name, meshes)));
+    };
+    EXPECT_LE(bytes({&long_numbers, 1}), most(long_numbers)) << format.name;
+    EXPECT_GT(bytes({&long_numbers, 1}), most(long_numbers) - 2048) << format.name;
+    EXPECT_LE(bytes({&large, 1}), most(large)) << format.name;
+    EXPECT_GT(bytes({&large, 1}), most(large) * 2 / 3) << format.name;
+    const std::array three{long_numbers, large, large};
+    if (format.many_surfaces) {
+      EXPECT_LE(bytes(three), most(long_numbers) + 2 * most(large)) << format.name;
+    }
+  }
+}
+
+TEST(GlbSize, EndsWithItsThirtyTwoBits) {
+  constexpr std::uint64_t kRoom =
+      0xFFFF'FFFFU - 12 - 8 - 8;  // beside the heads of the file and of two chunks
+  EXPECT_EQ(glb_size(1000, kRoom - 1000), 0xFFFF'FFFFU);
+  try {
+    glb_size(1000, kRoom - 999);
+    FAIL() << "not refused";
+  } catch (const MeshFileTooLarge& refused) {
+    EXPECT_EQ(refused.needed_bytes, std::uint64_t{1} << 32);
+    EXPECT_EQ(refused.limit, 0xFFFF'FFFFU);
+  }
+  EXPECT_EQ(glb_size(0, 0), 28U);
 }
 
 TEST_F(MeshWriters, PlyHoldsTheMesh) {

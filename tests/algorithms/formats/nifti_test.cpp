@@ -621,10 +621,15 @@ TEST(RealFile, HeadOfMricronComesBack) {
 TEST(RealFile, SamplesComeBack) {
   const char* folder = std::getenv("VOLSMOOTH_SAMPLE_DATA");
   if (!folder) GTEST_SKIP() << "VOLSMOOTH_SAMPLE_DATA is not set";
+  int files = 0;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
     const std::string name = entry.path().filename();
-    if (name.ends_with(".nii") || name.ends_with(".nii.gz")) expect_round_trip(entry.path());
+    if (!name.ends_with(".nii") && !name.ends_with(".nii.gz")) continue;
+    SCOPED_TRACE(name);
+    expect_round_trip(entry.path());
+    ++files;
   }
+  EXPECT_GT(files, 0) << folder << " has no NIfTI files";
 }
 
 }  // namespace

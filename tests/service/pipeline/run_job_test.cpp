@@ -8,11 +8,13 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <optional>
+#include <random>
 
 #include "algorithms/formats/nifti.h"
 #include "algorithms/surface/otsu.h"
 #include "algorithms/volume/parallel.h"
 #include "service/pipeline/pipeline.h"
+#include "service/pipeline/stages.h"
 #include "tests/support/mesh_checks.h"
 #include "tests/support/nifti_maker.h"
 #include "tests/support/scratch_folder.h"
@@ -249,6 +251,68 @@ TEST_F(RunJob, ASurfaceThatWouldNotFitEndsTheJobWithBothNumbers) {
   ASSERT_FALSE(results);
   EXPECT_EQ(results.error().slug, "job-too-large");
   EXPECT_GT(results.error().members.at("estimate_bytes"), results.error().members.at("limit_bytes"));
+}
+
+TEST(MeshFile, ThatItsFormatCannotHoldIsTheOrdersFault) {
+  const Problem problem = problem_of(MeshFileTooLarge(std::uint64_t{5} << 30, 0xFFFF'FFFFU));
+  EXPECT_EQ(problem.slug, "job-too-large");
+  EXPECT_THAT(problem.detail, HasSubstr("5.37 GB"));
+  EXPECT_THAT(problem.detail, HasSubstr("use stl or ply, or fewer isovalues"));
+  EXPECT_EQ(problem.members.at("estimate_bytes"), std::int64_t{5} << 30);
+  EXPECT_EQ(problem.members.at("limit_bytes"), 0xFFFF'FFFFU);
+}
+
+/// Half of the voxels inside, at random: 1.5 vertices a voxel.
+test::NiftiFile noise(std::int64_t edge) {
+  test::NiftiFile file = ball();
+  file.size = {edge, edge, edge};
+  std::mt19937 random(3);
+  file.voxels.resize(static_cast<std::size_t>(edge * edge * edge));
+  for (double& voxel : file.voxels) voxel = static_cast<double>(random() % 200);
+  return file;
+}
+
+std::int64_t bytes_in(const std::filesystem::path& folder) {
+  std::int64_t bytes = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder))
+    bytes += static_cast<std::int64_t>(entry.file_size());
+  return bytes;
+}
+
+TEST_F(RunJob, ResultsStayWithinWhatIsHeldBackForThemWhateverTheirRoughness) {
+  ComputeTask task = task_for(noise(64));
+  for (const char* method : {"compare", "mean-curvature-flow"}) {
+    task.order.method = method;
+    task.order.mesh_formats = {"stl", "ply", "obj", "glb"};
+    task.order.parameters = {{"flow_time_mm2", 1e-4}};
+    const auto plan = engine_.plan(task.order, task.volume.facts);
+    ASSERT_TRUE(plan);
+    task.parameters = plan->parameters;
+    const auto results = engine_.compute(task, [](std::string_view, double) {});
+    ASSERT_FALSE(results) << method;
+    EXPECT_EQ(results.error().slug, "job-too-large");
+    EXPECT_GT(results.error().members.at("estimate_bytes"), results.error().members.at("limit_bytes"));
+    EXPECT_EQ(results.error().members.at("limit_bytes"), plan->disk_bytes);
+    EXPECT_LE(bytes_in(task.output_dir), plan->disk_bytes) << method;
+    std::filesystem::remove_all(task.output_dir);
+    std::filesystem::create_directory(task.output_dir);
+  }
+}
+
+TEST_F(RunJob, ARealHeadAndItsOriginalHaveRoomInEveryFormat) {
+  const std::filesystem::path head = "/usr/share/mricron/templates/ch2.nii.gz";
+  if (!std::filesystem::exists(head)) GTEST_SKIP() << "mricron-data is not installed";
+  ComputeTask task = task_for(ball());
+  task.volume_file = head;
+  task.volume.facts = *engine_.inspect(head, {}, no_progress);
+  task.order.method = "compare";
+  task.order.parameters = {{"flow_time_mm2", 1.0}};
+  task.order.isovalues = {80.0};  // of all, that with the most vertices
+  task.order.mesh_formats = {"stl", "obj"};
+  run(task);
+  const auto held = engine_.plan(task.order, task.volume.facts)->disk_bytes;
+  EXPECT_LT(bytes_in(task.output_dir), held);
+  EXPECT_GT(bytes_in(task.output_dir), held / 5) << "much is refused for the sake of a bound";
 }
 
 TEST_F(RunJob, PaddingDoesNotMoveTheAutomaticIsovalue) {

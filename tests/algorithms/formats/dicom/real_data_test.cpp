@@ -34,7 +34,8 @@ class RealDicom : public testing::Test {
  protected:
   void SetUp() override {
     const char* folder = std::getenv("VOLSMOOTH_TEST_DATA");
-    if (folder == nullptr || !fs::is_directory(folder)) GTEST_SKIP() << "VOLSMOOTH_TEST_DATA names no folder";
+    if (folder == nullptr) GTEST_SKIP() << "VOLSMOOTH_TEST_DATA is not set";
+    ASSERT_TRUE(fs::is_directory(folder)) << "VOLSMOOTH_TEST_DATA names no folder";
     folder_ = folder;
   }
 
