@@ -26,7 +26,8 @@ ResultsSize held_for_results(const JobOrder& order, const VolumeFacts& volume, s
 /// "dicom-surface-segmentation".
 std::int64_t most_bytes_of_dicom(const std::string& output, std::int64_t vertices, std::int64_t triangles);
 
-/// Results would be longer than what is held back for them. Thrown before they are written.
+/// Results would be longer than what is held back for them, with too little room beyond. Thrown before they
+/// are written.
 class ResultsTooLarge : public std::length_error {
  public:
   ResultsTooLarge(std::int64_t needed, std::int64_t held)

@@ -251,7 +251,8 @@ class JobRun {
     }
   }
 
-  /// Throws ResultsTooLarge when a file of `meshes` would leave less than the rest of the results may take.
+  /// Throws ResultsTooLarge when with a file of `meshes` the results may go beyond what is held back for
+  /// them, and the disk has not room for twice as much: the rest is others'.
   void make_room_for(std::span<const Mesh> meshes,
                      const std::function<std::int64_t(std::int64_t, std::int64_t)>& most_bytes) const {
     std::int64_t needed = static_cast<std::int64_t>(parts_to_come_) * held_.beside_surfaces;
@@ -259,7 +260,9 @@ class JobRun {
       needed += static_cast<std::int64_t>(std::filesystem::file_size(task_.output_dir / result.name));
     for (const Mesh& mesh : meshes)
       needed += most_bytes(std::ssize(mesh.positions), std::ssize(mesh.triangles));
-    if (needed > held_.all) throw ResultsTooLarge(needed, held_.all);
+    const std::int64_t beyond = needed - held_.all;
+    if (beyond > 0 && limits_.free_bytes(task_.output_dir) < 2 * beyond)
+      throw ResultsTooLarge(needed, held_.all);
   }
 
   std::filesystem::path new_result(const std::string& name, const char* kind, const std::string& method,
@@ -339,10 +342,11 @@ tl::expected<std::vector<Result>, Problem> run_job(const ComputeTask& task, cons
     return tl::unexpected(problem_of(file));
   } catch (const ResultsTooLarge& results) {
     return tl::unexpected(
-        Problem{"job-too-large",
+        Problem{"insufficient-storage",
                 "The surfaces are so rough that the results need " + gigabytes(results.needed_bytes) +
                     " of the disk or more, and " + gigabytes(results.limit) +
-                    " is held back for them; smooth more strongly, ask for fewer formats or isovalues or for "
+                    " is held back for them, beyond which the disk has too little; free some space, smooth "
+                    "more strongly, ask for fewer formats or isovalues or for "
                     "others, or crop the volume.",
                 {{"estimate_bytes", results.needed_bytes}, {"limit_bytes", results.limit}}});
   }
