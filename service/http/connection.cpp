@@ -12,6 +12,7 @@
 #include <boost/beast/http/empty_body.hpp>
 #include <boost/beast/http/parser.hpp>
 #include <boost/beast/http/write.hpp>
+#include <cerrno>
 #include <chrono>
 #include <ctime>
 #include <sstream>
@@ -134,9 +135,12 @@ asio::awaitable<TlsStream::Outcome> Connection::write_some(asio::const_buffer fr
 asio::awaitable<bool> Connection::begin(double seconds) {
   if (!tls_) co_return true;
   const Deadline deadline(*this, seconds);
-  const auto [unreadable] = co_await socket_.async_wait(Socket::wait_read, kAwait);
   char first = 0;
-  if (unreadable || ::recv(socket_.native_handle(), &first, 1, MSG_PEEK | MSG_DONTWAIT) != 1) co_return false;
+  for (ssize_t got = -1; got != 1;) {
+    const auto [unreadable] = co_await socket_.async_wait(Socket::wait_read, kAwait);
+    got = unreadable ? 0 : ::recv(socket_.native_handle(), &first, 1, MSG_PEEK | MSG_DONTWAIT);
+    if (got == 0 || (got < 0 && errno != EAGAIN && errno != EINTR)) co_return false;
+  }
   if (first == kTlsHandshake) co_return !co_await tls_->handshake();
   tls_.reset();
   const std::string answer =

@@ -279,10 +279,6 @@ tl::expected<std::vector<LedgerEntry>, Problem> JobService::ledger(const Caller&
 
 tl::expected<Job, Problem> JobService::deliver_again(const Caller& caller, std::string_view job_id) {
   const auto found = job(caller, job_id);
-  if (found && found->order.destination.empty())
-    return refuse("bad-parameter",
-                  "The job has no destination; name one as 'destination' in the order of another.",
-                  {{"member", "destination"}});
   if (!found || !state_->deliveries.retry(job_id)) return found;
   state_->delivering.wake();
   return job(caller, job_id);

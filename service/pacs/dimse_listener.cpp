@@ -131,9 +131,9 @@ void DimseListener::log_fruitless(const Settings::Log& log, const std::string& l
 void DimseListener::begin(FileDescriptor connection, const boost::asio::ip::address_v4& address) {
   const auto expects = [&](const auto& preset) { return preset.second.callers.may_come_from(address); };
   if (std::ranges::none_of(settings_.presets, expects)) {
-    turned_away_.add(std::move(connection), {kStranger, sizeof kStranger});
     log_fruitless(settings_.log_warning, "rejected: " + address.to_string() + " may not call");
     settings_.on_stranger("");
+    turned_away_.add(std::move(connection), {kStranger, sizeof kStranger});
     return;
   }
   if (served_.size() >= kAssociations) {
