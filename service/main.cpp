@@ -197,12 +197,16 @@ void keep_memory_of_answers() {
   ::mallopt(M_TRIM_THRESHOLD, 8 << 20);
 }
 
-sigset_t awaited_signals() {
+/// SIGHUP only where it has a meaning: under nohup it is to be ignored, and a signal that is waited for is
+/// not.
+sigset_t awaited_signals(bool has_certificate) {
   sigset_t set;
   sigemptyset(&set);
   sigaddset(&set, SIGTERM);
   sigaddset(&set, SIGINT);
-  sigaddset(&set, SIGHUP);
+  struct sigaction hang_up {};
+  ::sigaction(SIGHUP, nullptr, &hang_up);
+  if (has_certificate || hang_up.sa_handler != SIG_IGN) sigaddset(&set, SIGHUP);
   return set;
 }
 
@@ -301,7 +305,7 @@ void serve(const Options& options) {
   jobs.start();
   log_event("ready", "volsmoothd " VOLSMOOTH_VERSION " listening on " + server.address());
 
-  const sigset_t signals = awaited_signals();
+  const sigset_t signals = awaited_signals(!options.server.tls_certificate.empty());
   int received = 0;
   // Without TLS there is nothing to read again: it stops, like any program whose terminal goes.
   while (sigwait(&signals, &received) == 0 && received == SIGHUP && !options.server.tls_certificate.empty())
@@ -364,7 +368,7 @@ int run(int argc, char** argv) {
 
   keep_memory_of_answers();
   // Before any thread is there: all inherit the mask, and only sigwait takes them.
-  const sigset_t signals = awaited_signals();
+  const sigset_t signals = awaited_signals(!options.server.tls_certificate.empty());
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   ::signal(SIGPIPE, SIG_IGN);
   start_log(options.log_level);

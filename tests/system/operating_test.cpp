@@ -227,6 +227,16 @@ TEST_F(OperatingTest, WithoutTlsAHangUpStopsItInOrder) {
   EXPECT_THAT(daemon.log(), HasSubstr("SIGHUP"));
 }
 
+TEST_F(OperatingTest, UnderNohupItOutlivesItsTerminal) {
+  ::signal(SIGHUP, SIG_IGN);  // as nohup leaves it to the program that it starts
+  Daemon daemon(VOLSMOOTHD);
+  ::signal(SIGHUP, SIG_DFL);
+  ::kill(daemon.pid(), SIGHUP);
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  EXPECT_TRUE(daemon.running());
+  EXPECT_EQ(daemon.terminate(), 0);
+}
+
 TEST_F(OperatingTest, MetricsHaveTheTimeOfEveryStage) {
   Daemon daemon(VOLSMOOTHD);
   const ServiceClient service(daemon);
