@@ -150,11 +150,10 @@ TEST_F(Tls, StrangersGetSoManyHandshakesAndWhoHasATokenAnyNumber) {
   TlsClient client(server_->address());
   ASSERT_TRUE(client.handshake());
   const auto start = std::chrono::steady_clock::now();
-  const int strangers = begun(100);
+  const int strangers = begun(100), more = begun(20);
   const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
   EXPECT_GE(strangers, 39);
-  EXPECT_LE(strangers, 40 + 10 * taken.count());
-  EXPECT_EQ(begun(1), 0);
+  EXPECT_LE(strangers + more, 40 + 10 * taken.count());
   const std::string authorized = request("GET /v1/jobs", "", "Authorization: Bearer " + text + "\r\n");
   ASSERT_TRUE(exchange(client, authorized).first.starts_with("HTTP/1.1 200"));
   EXPECT_EQ(begun(100), 100);
