@@ -60,13 +60,14 @@ Expected<Json> run_job(const Options& options, const Session& session, const std
   return job;
 }
 
-/// A cancelled job lets go of its volume in a moment; one that goes on all the same keeps it.
+/// A cancelled job lets go of its volume in a moment; one that goes on all the same keeps it. Any other
+/// refusal stands.
 void give_up_volume(const Session& session, const std::string& id) {
   constexpr int kTries = 20;
   constexpr std::chrono::milliseconds kPause{150};
   for (int tries = 1; tries <= kTries; ++tries) {
     const auto deleted = session.api.delete_volume(id);
-    if (deleted || deleted.error().code == ExitCode::kUnreachable) return;
+    if (deleted || deleted.error().code != ExitCode::kTryLater) return;
     std::this_thread::sleep_for(kPause);
   }
 }
