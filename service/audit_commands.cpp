@@ -7,6 +7,7 @@
 
 #include "service/commands.h"
 #include "service/jobs/audit_seal.h"
+#include "service/jobs/data_folder.h"
 #include "service/jobs/job_json.h"
 #include "service/jobs/store_database.h"
 
@@ -14,13 +15,6 @@ namespace volsmooth {
 namespace {
 
 using nlohmann::json;
-
-std::filesystem::path database_in(const std::filesystem::path& data_dir) {
-  auto file = data_dir / "volsmooth.db";
-  if (!std::filesystem::exists(file))
-    throw std::runtime_error("there is no database in " + data_dir.string() + "; give the daemon's --data");
-  return file;
-}
 
 /// Such as 1234:0123abcd..., as `audit verify` prints it.
 AuditHead head_from(const std::string& text) {

@@ -81,9 +81,9 @@ json answer_about_tokens(Tokens& tokens, const json& request) {
 
 json answer_without_daemon(const std::filesystem::path& data_dir, const json& request) {
   if (request.at("command") == "status") return problem("no daemon runs on this data folder");
-  if (!std::filesystem::exists(data_dir / kDatabaseFile)) {
-    if (request.at("command") != "token create")
-      return problem("there is no database in " + data_dir.string() + "; give the daemon's --data");
+  if (request.at("command") != "token create") {
+    database_in(data_dir);
+  } else if (!std::filesystem::exists(data_dir / kDatabaseFile)) {
     std::cerr << "volsmoothd: " << data_dir.string()
               << " is new: the token is for a daemon with this --data\n";
   }

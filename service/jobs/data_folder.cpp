@@ -16,6 +16,13 @@ bool is_of_a_beginning(const fs::directory_entry& entry) {
 
 }  // namespace
 
+fs::path database_in(const fs::path& folder) {
+  auto file = folder / kDatabaseFile;
+  if (!fs::exists(file))
+    throw std::runtime_error("there is no database in " + folder.string() + "; give the daemon's --data");
+  return file;
+}
+
 const fs::path& own_data_folder(const fs::path& folder) {
   if (!fs::is_directory(folder) || fs::exists(folder / kDatabaseFile)) return folder;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder))
