@@ -17,11 +17,10 @@ namespace volsmooth {
 //
 // send: the daemon asks for an association, {"host", "port", "called", "calling", "sop_classes": [UID]}, by
 // TLS with "tls", and gets {} or a failure. Then, for each instance, it sends its bytes, {"sop_class",
-// "sop_instance"}, and gets
-// {"status": of the C-STORE response}, {"failure": "not-accepted" | "unreadable"}, or a failure that ends it
-// all. It closes its side when it has no more. A failure is {"failure": "unreachable" | "lost" | "tls" (not
-// agreed on, or no trust) | "tls-files" (cannot be used)}, or
-// {"failure": "rejected", "result", "source", "reason"} with the numbers of PS3.8, 9.3.4.
+// "sop_instance"}, and gets {"status": of the C-STORE response}, {"failure": "not-accepted" | "unreadable"},
+// or a failure that ends it all. It closes its side when it has no more. A failure is {"failure":
+// "unreachable" | "lost" | "tls" (not agreed on, or no trust) | "tls-files" (cannot be used)}, or {"failure":
+// "rejected", "result", "source", "reason"} with the numbers of PS3.8, 9.3.4.
 //
 // receive: the daemon says {}, or {"tls"}. The child, whose descriptor 3 is an accepted connection, says
 // {"called", "calling"}, or {"failure": "tls" | "tls-files"} when it comes to no association, and gets

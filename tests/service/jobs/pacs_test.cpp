@@ -122,6 +122,12 @@ class PacsJobs : public JobServiceTest {
     throw std::runtime_error("the delivery did not get there");
   }
 
+  /// Until the delivery of a job was tried, and postponed.
+  void wait_for_a_try(const std::string& id) {
+    while (!service_->job(kAnyone, id)->delivery || service_->job(kAnyone, id)->delivery->tries == 0)
+      std::this_thread::sleep_for(1ms);
+  }
+
   FakeNode node_;
   std::optional<Pacs> pacs_;  ///< in place of the node's
   std::chrono::milliseconds patience_ = 1h;
@@ -438,8 +444,7 @@ TEST_F(PacsJobs, DeliveryGoesOnAfterARestart) {
   node_.up = false;
   open();
   const std::string id = service_->submit(kAnyone, delivery_order()).value().id;
-  while (!service_->job(kAnyone, id)->delivery || service_->job(kAnyone, id)->delivery->tries == 0)
-    std::this_thread::sleep_for(1ms);
+  wait_for_a_try(id);
   service_.reset();
   node_.up = true;
   open();
@@ -496,8 +501,7 @@ TEST_F(PacsJobs, ADeletedJobIsNotDelivered) {
   node_.up = false;
   open();
   const std::string id = service_->submit(kAnyone, delivery_order()).value().id;
-  while (!service_->job(kAnyone, id)->delivery || service_->job(kAnyone, id)->delivery->tries == 0)
-    std::this_thread::sleep_for(1ms);
+  wait_for_a_try(id);
   ASSERT_TRUE(service_->delete_job(kAnyone, id));
   node_.up = true;
   std::this_thread::sleep_for(100ms);
@@ -521,8 +525,7 @@ TEST_F(PacsJobs, ADeliveryThatAFullDiskEndsGoesOnWhenThereIsRoom) {
   node_.up = false;
   open();
   const std::string id = service_->submit(kAnyone, delivery_order()).value().id;
-  while (!service_->job(kAnyone, id)->delivery || service_->job(kAnyone, id)->delivery->tries == 0)
-    std::this_thread::sleep_for(1ms);
+  wait_for_a_try(id);
   {
     const DiskCalls disk(settings().data_dir, [](const std::string& call) {
       return call == "write volsmooth.db-wal" ? ENOSPC : 0;
